@@ -1,0 +1,2 @@
+//! The `scrnn` program.
+fn main() {}

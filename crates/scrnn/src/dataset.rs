@@ -1,0 +1,192 @@
+//! Sequences of samples, possibly of different lengths, on named channels (thesis 2.6.1).
+//!
+//! A sequence of L samples gives T = L - xi steps: at step t (from 0) the input is sample t and the target is
+//! sample t + xi.
+
+use crate::error::{Error, Result};
+use crate::topology::Topology;
+
+/// One recorded sequence: samples x channels, row-major.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sequence {
+    /// A name to show; may be empty.
+    pub name: String,
+    channels: usize,
+    values: Vec<f64>,
+}
+
+impl Sequence {
+    /// Takes `values` as samples of `channels` numbers each.
+    ///
+    /// # Errors
+    /// [`Error::Length`] if the values do not fill whole samples.
+    pub fn new(name: impl Into<String>, channels: usize, values: Vec<f64>) -> Result<Self> {
+        let name = name.into();
+        if channels == 0 || !values.len().is_multiple_of(channels) {
+            let needed = values.len().next_multiple_of(channels.max(1));
+            return Err(Error::Length { what: format!("sequence `{name}`"), found: values.len(), needed });
+        }
+        Ok(Self { name, channels, values })
+    }
+
+    /// Number of samples.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.values.len() / self.channels
+    }
+
+    /// Whether there is no sample.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.values.is_empty()
+    }
+
+    /// The sample at index `step`.
+    #[must_use]
+    pub fn sample(&self, step: usize) -> &[f64] {
+        &self.values[step * self.channels..(step + 1) * self.channels]
+    }
+
+    /// All samples, row-major.
+    #[must_use]
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// The first `samples` samples, or all there are.
+    #[must_use]
+    pub fn truncated(&self, samples: usize) -> Self {
+        let end = samples.min(self.len()) * self.channels;
+        Self { name: self.name.clone(), channels: self.channels, values: self.values[..end].to_vec() }
+    }
+}
+
+/// Sequences on the same channels.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Dataset {
+    channels: Vec<String>,
+    sequences: Vec<Sequence>,
+}
+
+impl Dataset {
+    /// Checks and collects sequences.
+    ///
+    /// # Errors
+    /// [`Error::NoSequences`], [`Error::Length`] when a sequence has another number of channels, and
+    /// [`Error::NotFinite`] with the place of the first bad sample.
+    pub fn new(channels: Vec<String>, sequences: Vec<Sequence>) -> Result<Self> {
+        if sequences.is_empty() {
+            return Err(Error::NoSequences);
+        }
+        for (s, sequence) in sequences.iter().enumerate() {
+            if sequence.channels != channels.len() {
+                let what = format!("each sample of sequence {s}");
+                return Err(Error::Length { what, found: sequence.channels, needed: channels.len() });
+            }
+            if let Some(index) = sequence.values.iter().position(|value| !value.is_finite()) {
+                return Err(Error::NotFinite {
+                    sequence: s,
+                    step: index / channels.len(),
+                    channel: channels[index % channels.len()].clone(),
+                    value: sequence.values[index],
+                });
+            }
+        }
+        Ok(Self { channels, sequences })
+    }
+
+    /// Names for channels that have none: `y1`, `y2`, ...
+    #[must_use]
+    pub fn numbered_channels(count: usize) -> Vec<String> {
+        (1..=count).map(|i| format!("y{i}")).collect()
+    }
+
+    /// The channels' names.
+    #[must_use]
+    pub fn channels(&self) -> &[String] {
+        &self.channels
+    }
+
+    /// The sequences.
+    #[must_use]
+    pub fn sequences(&self) -> &[Sequence] {
+        &self.sequences
+    }
+
+    /// Samples over all sequences.
+    #[must_use]
+    pub fn total_samples(&self) -> usize {
+        self.sequences.iter().map(Sequence::len).sum()
+    }
+
+    /// T_total: steps over all sequences that a network of delay `delay` predicts.
+    #[must_use]
+    pub fn total_steps(&self, delay: usize) -> usize {
+        self.sequences.iter().map(|sequence| sequence.len().saturating_sub(delay)).sum()
+    }
+
+    /// Checks that a network of this topology can be trained on the set or recognise it.
+    ///
+    /// # Errors
+    /// [`Error::Length`] for another number of channels, [`Error::SequenceTooShort`].
+    pub fn check_for(&self, topology: &Topology) -> Result<()> {
+        if self.channels.len() != topology.channels() {
+            let what = "each sample of the data set".to_owned();
+            return Err(Error::Length { what, found: self.channels.len(), needed: topology.channels() });
+        }
+        let delay = topology.delay();
+        for (s, sequence) in self.sequences.iter().enumerate() {
+            if sequence.len() <= delay {
+                return Err(Error::SequenceTooShort { sequence: s, length: sequence.len(), delay });
+            }
+        }
+        Ok(())
+    }
+
+    /// Mean and variance (divided by n) of every channel over all samples.
+    #[must_use]
+    pub fn channel_moments(&self) -> Vec<(f64, f64)> {
+        let n = self.total_samples() as f64;
+        (0..self.channels.len())
+            .map(|i| {
+                let values =
+                    || self.sequences.iter().flat_map(|s| s.values.chunks_exact(s.channels)).map(move |x| x[i]);
+                let mean = values().sum::<f64>() / n;
+                (mean, values().map(|x| (x - mean).powi(2)).sum::<f64>() / n)
+            })
+            .collect()
+    }
+
+    /// The same sequences with every sample passed through `map(channel, value)`.
+    #[must_use]
+    pub fn map(&self, map: impl Fn(usize, f64) -> f64) -> Self {
+        let n = self.channels.len();
+        let through = |sequence: &Sequence| Sequence {
+            name: sequence.name.clone(),
+            channels: n,
+            values: sequence.values.iter().enumerate().map(|(k, &x)| map(k % n, x)).collect(),
+        };
+        Self { channels: self.channels.clone(), sequences: self.sequences.iter().map(through).collect() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bad_sample_is_named_by_its_place() {
+        let good = Sequence::new("a", 2, vec![0.0; 6]).unwrap();
+        let bad = Sequence::new("b", 2, vec![0.0, 1.0, 2.0, f64::NAN]).unwrap();
+        let error = Dataset::new(Dataset::numbered_channels(2), vec![good, bad]).unwrap_err();
+        assert!(error.to_string().starts_with("sequence 1, step 1, channel y2 is NaN"), "{error}");
+    }
+
+    #[test]
+    fn moments_run_over_all_sequences() {
+        let a = Sequence::new("a", 1, vec![1.0, 2.0]).unwrap();
+        let b = Sequence::new("b", 1, vec![6.0]).unwrap();
+        let set = Dataset::new(Dataset::numbered_channels(1), vec![a, b]).unwrap();
+        assert_eq!(set.channel_moments(), [(3.0, 14.0 / 3.0)]);
+    }
+}

@@ -1,0 +1,101 @@
+//! Initial internal states u_0 of each sequence and their mean (thesis 2.6.1).
+//!
+//! ```text
+//! ln L_init = sum_s sum_i ( -ln(2 pi var_IS) / 2 - (u_0,i^(s) - u_i)^2 / (2 var_IS) )    (2.16)
+//! ```
+//!
+//! The sums run over units whose group learns its initial state; all others start from 0 and stay there.
+
+use crate::topology::Topology;
+
+/// u_0 for every sequence, and the mean u.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InitialStates {
+    units: usize,
+    values: Vec<f64>,
+    mean: Vec<f64>,
+}
+
+impl InitialStates {
+    /// All zeros, for `sequences` sequences.
+    #[must_use]
+    pub fn zeros(topology: &Topology, sequences: usize) -> Self {
+        let units = topology.context_units();
+        Self { units, values: vec![0.0; sequences * units], mean: vec![0.0; units] }
+    }
+
+    /// Number of sequences.
+    #[must_use]
+    pub fn sequences(&self) -> usize {
+        self.values.len() / self.units
+    }
+
+    /// u_0 of sequence `s`, N_C values.
+    #[must_use]
+    pub fn sequence(&self, s: usize) -> &[f64] {
+        &self.values[s * self.units..(s + 1) * self.units]
+    }
+
+    /// u_0 of sequence `s`, to change.
+    pub fn sequence_mut(&mut self, s: usize) -> &mut [f64] {
+        &mut self.values[s * self.units..(s + 1) * self.units]
+    }
+
+    /// u_0 of all sequences, row-major [S, N_C].
+    #[must_use]
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// u_0 of all sequences, to change.
+    pub fn values_mut(&mut self) -> &mut [f64] {
+        &mut self.values
+    }
+
+    /// The mean u, N_C values.
+    #[must_use]
+    pub fn mean(&self) -> &[f64] {
+        &self.mean
+    }
+
+    /// The mean u, to change.
+    pub fn mean_mut(&mut self) -> &mut [f64] {
+        &mut self.mean
+    }
+
+    /// ln L_init of (2.16) in nats, constant included.
+    #[must_use]
+    pub fn ln_prior(&self, topology: &Topology, variance: f64) -> f64 {
+        let constant = -0.5 * (2.0 * std::f64::consts::PI * variance).ln();
+        let learned: Vec<bool> = topology.per_unit(|group| group.learns_initial_state).collect();
+        let mut sum = 0.0;
+        for u0 in self.values.chunks_exact(self.units) {
+            for ((&u0, &mean), &learned) in u0.iter().zip(&self.mean).zip(&learned) {
+                if learned {
+                    sum += constant - (u0 - mean).powi(2) / (2.0 * variance);
+                }
+            }
+        }
+        sum
+    }
+
+    /// Adds the prior's part of the gradient to `states`, and writes the mean's gradient into `mean`:
+    ///
+    /// ```text
+    /// d ln L_all / d u_0,i^(s) = d ln L_out / d u_0,i^(s) - (u_0,i^(s) - u_i) / var_IS    (2.23)
+    /// d ln L_all / d u_i       = sum_s (u_0,i^(s) - u_i) / var_IS                          (2.24)
+    /// ```
+    pub fn add_prior_gradient(&self, topology: &Topology, variance: f64, gradient: &mut InitialStates) {
+        gradient.mean.fill(0.0);
+        for (i, learned) in topology.per_unit(|group| group.learns_initial_state).enumerate() {
+            if !learned {
+                continue;
+            }
+            for s in 0..self.sequences() {
+                let pull = (self.values[s * self.units + i] - self.mean[i]) / variance;
+                gradient.values[s * self.units + i] -= pull;
+                gradient.mean[i] += pull;
+            }
+        }
+    }
+}
