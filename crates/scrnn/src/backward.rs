@@ -1,0 +1,118 @@
+//! Back-propagation through time (thesis 2.6.3, appendix B.1).
+//!
+//! ```text
+//! d/du_t,i = (1 - c_t,i^2) ( sum_k (w_cc[k,i] / tau_k) d/du_{t+1,k} + sum_o w_oc[o,i] d/du_t,o )
+//!            + (1 - 1/tau_i) d/du_{t+1,i}                                                    (2.22), context
+//! d/dw_ij  = (1/tau_i) sum_t d/du_t,i x_t,j   or   c_{t-1,j}                                 (2.20), context
+//! d/dw_ij  = sum_t d/du_t,i c_t,j                                                            (2.20), outputs
+//! d/db_i   = the same with 1 in place of the sender                                          (2.21)
+//! ```
+//!
+//! A delta row k holds d/du_{k+1} of the context and d/du of the outputs made from c_k: the joint product of
+//! [`crate::packed`] read backwards. Its outer product with the state row k is the whole gradient of that step.
+
+use pulp::Simd;
+
+use crate::batch::Block;
+use crate::kernels::outer::{Rows, accumulate};
+use crate::kernels::panels::{Columns, Finish, Product, multiply};
+use crate::packed::Packed;
+use crate::trajectory::Trajectory;
+
+/// Turns sums over receivers into d/du of the senders.
+struct Retreat<'a> {
+    states: &'a [f64],
+    state_stride: usize,
+    after: &'a [f64],
+    before: &'a mut [f64],
+    delta_stride: usize,
+    decay: &'a [f64],
+}
+
+impl<S: Simd> Finish<S> for Retreat<'_> {
+    #[inline(always)]
+    fn finish(&mut self, simd: S, column: usize, row: usize, sum: S::f64s) {
+        let load = |list: &[f64], at: usize| S::as_simd_f64s(&list[at..at + S::F64_LANES]).0[0];
+        let c = load(self.states, column * self.state_stride + row);
+        let after = load(self.after, column * self.delta_stride + row);
+        let slope = simd.sub_f64s(simd.splat_f64s(1.0), simd.mul_f64s(c, c));
+        let kept = simd.mul_f64s(load(self.decay, row), after);
+        let at = column * self.delta_stride + row;
+        let (before, _) = S::as_mut_simd_f64s(&mut self.before[at..at + S::F64_LANES]);
+        before[0] = simd.mul_add_f64s(slope, sum, kept);
+    }
+}
+
+/// Goes back through the products of `range`, a segment of the span that starts at `span_start`. The delta row behind
+/// the segment's last product must hold d/du of the step after it; afterwards, row 0 holds d/du of the segment's start.
+#[inline(always)]
+pub(crate) fn run<S: Simd>(
+    simd: S,
+    packed: &Packed,
+    block: &Block,
+    range: std::ops::Range<usize>,
+    span_start: usize,
+    trajectory: &mut Trajectory,
+) {
+    let (n, n_x, n_c) = (block.columns(), packed.n_x, packed.n_c);
+    let (state_stride, delta_stride) = (packed.state_stride, packed.delta_stride);
+    let first = range.start;
+    for k in range.rev() {
+        let active = block.active(k);
+        let later = block.active(k + 1);
+        let at = (k - first) * n * delta_stride;
+        let (before, after) = trajectory.deltas[at..at + 2 * n * delta_stride].split_at_mut(n * delta_stride);
+        for (column, delta) in after.chunks_exact_mut(delta_stride).enumerate().take(active) {
+            if column >= later {
+                delta[..n_c].fill(0.0);
+            }
+            let outputs = &mut delta[n_c..n_c + packed.n_out];
+            if k == 0 {
+                outputs.fill(0.0);
+            } else {
+                let step = ((k - 1) * n + column) * n_x;
+                outputs[..n_x].copy_from_slice(&trajectory.mean[step..step + n_x]);
+                if packed.n_out > n_x {
+                    outputs[n_x..].copy_from_slice(&trajectory.variance[step..step + n_x]);
+                }
+            }
+        }
+        let at = (k - span_start) * n * state_stride;
+        let states = &trajectory.states[at..at + n * state_stride];
+        let sources = [Columns { values: after, stride: delta_stride }];
+        let mut retreat = Retreat { states, state_stride, after, before, delta_stride, decay: &packed.decay };
+        let matrices = [&packed.backward];
+        multiply(simd, Product { matrices, sources, columns: active, start: &packed.zeros }, &mut retreat);
+    }
+}
+
+/// Adds the outer products of a segment to the gradient of [`Packed::gradient_len`] values.
+#[inline(always)]
+pub(crate) fn gather<S: Simd>(
+    simd: S,
+    packed: &Packed,
+    block: &Block,
+    range: std::ops::Range<usize>,
+    span_start: usize,
+    trajectory: &Trajectory,
+    gradient: &mut [f64],
+) {
+    let n = block.columns();
+    let (context, input) = gradient.split_at_mut(packed.gradient_split());
+    let mut add = |from: usize, count: usize| {
+        let deltas = &trajectory.deltas[(from - range.start + 1) * n * packed.delta_stride..];
+        let states = &trajectory.states[(from - span_start) * n * packed.state_stride..];
+        let deltas = Rows { values: deltas, stride: packed.delta_stride };
+        let states = Rows { values: states, stride: packed.state_stride };
+        accumulate(simd, deltas, states, count, packed.rows, (0, packed.n_c), context);
+        let inputs = (packed.rows, packed.rows + packed.n_x + 1);
+        accumulate(simd, deltas, states, count, packed.rows, inputs, input);
+    };
+    if block.active(range.end - 1) == n {
+        add(range.start, range.len() * n);
+    } else {
+        for k in range.clone() {
+            add(k, block.active(k));
+        }
+    }
+}

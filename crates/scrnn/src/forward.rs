@@ -1,0 +1,256 @@
+//! Forward dynamics (thesis 2.5; multiple timescales 2.10.1).
+//!
+//! ```text
+//! u_i <- (1 - 1/tau_i) u_i + (1/tau_i) (sum_j w_cx[i,j] x_j + sum_j w_cc[i,j] c_j + b_i)    (2.2), (2.27)
+//! c_i <- tanh u_i                                                                           (2.3)
+//! y_i  = tanh (sum_j w_yc[i,j] c_j + b_i)                                                   (2.2), (2.4)
+//! v_i  = exp  (sum_j w_vc[i,j] c_j + b_i) + floor                                           (2.2), (2.5)
+//! ```
+//!
+//! Letters: `x` input, `u` internal state, `c` context, `y` mean, `v` variance, `w_ab` weight to a from b.
+//!
+//! [`Plain`] is the reference: one sequence, one step at a time. The fast version runs all columns of a block.
+
+use pulp::Simd;
+
+use crate::batch::Block;
+use crate::kernels::activation::tanh;
+use crate::kernels::panels::{Columns, Finish, Product, multiply};
+use crate::network::Network;
+use crate::packed::Packed;
+use crate::parameters::Block as Parameter;
+use crate::trajectory::Trajectory;
+
+/// One network at one moment, computed in plain loops.
+#[derive(Debug, Clone)]
+pub struct Plain<'a> {
+    network: &'a Network,
+    tau: Vec<f64>,
+    /// Internal state u, N_C values.
+    pub u: Vec<f64>,
+    /// Context c = tanh u, N_C values.
+    pub c: Vec<f64>,
+    /// Mean y, N_O values; 0 before the first step.
+    pub y: Vec<f64>,
+    /// Variance v, N_O values; empty without variance units.
+    pub v: Vec<f64>,
+}
+
+impl<'a> Plain<'a> {
+    /// The network at its initial state `u0`, N_C values.
+    ///
+    /// # Panics
+    /// If `u0` has another length.
+    #[must_use]
+    pub fn new(network: &'a Network, u0: &[f64]) -> Self {
+        let topology = &network.topology;
+        assert_eq!(u0.len(), topology.context_units(), "one initial value for each context unit");
+        Self {
+            network,
+            tau: topology.time_constants(),
+            u: u0.to_vec(),
+            c: u0.iter().map(|u| u.tanh()).collect(),
+            y: vec![0.0; topology.channels()],
+            v: vec![0.0; topology.output_units() - topology.channels()],
+        }
+    }
+
+    /// Advances one step with input `x`, N_I values.
+    pub fn step(&mut self, x: &[f64]) {
+        let parameters = &self.network.parameters;
+        let affine = |weights: Parameter, bias: Parameter, from: &[f64], i: usize| {
+            let row = &parameters.block(weights)[i * from.len()..(i + 1) * from.len()];
+            row.iter().zip(from).fold(parameters.block(bias)[i], |sum, (w, from)| sum + w * from)
+        };
+        let drive: Vec<f64> = (0..self.u.len())
+            .map(|i| {
+                let row = &parameters.block(Parameter::ContextFromInput)[i * x.len()..(i + 1) * x.len()];
+                let input: f64 = row.iter().zip(x).map(|(w, x)| w * x).sum();
+                input + affine(Parameter::ContextFromContext, Parameter::ContextBias, &self.c, i)
+            })
+            .collect();
+        for (i, drive) in drive.into_iter().enumerate() {
+            self.u[i] = (1.0 - 1.0 / self.tau[i]) * self.u[i] + drive / self.tau[i];
+            self.c[i] = self.u[i].tanh();
+        }
+        for (i, y) in self.y.iter_mut().enumerate() {
+            *y = affine(Parameter::MeanFromContext, Parameter::MeanBias, &self.c, i).tanh();
+        }
+        let floor = self.network.topology.variance_floor();
+        for (i, v) in self.v.iter_mut().enumerate() {
+            *v = affine(Parameter::VarianceFromContext, Parameter::VarianceBias, &self.c, i).exp() + floor;
+        }
+    }
+}
+
+/// Takes the sums of the joint product into the internal states.
+pub(crate) struct Advance<'a> {
+    /// [column][row]: u.
+    pub internal: &'a mut [f64],
+    /// 1 - 1/tau.
+    pub decay: &'a [f64],
+    /// Rows of a column.
+    pub rows: usize,
+}
+
+impl<S: Simd> Finish<S> for Advance<'_> {
+    #[inline(always)]
+    fn finish(&mut self, simd: S, column: usize, row: usize, sum: S::f64s) {
+        let (decay, _) = S::as_simd_f64s(&self.decay[row..row + S::F64_LANES]);
+        let (u, _) = S::as_mut_simd_f64s(&mut self.internal[column * self.rows + row..][..S::F64_LANES]);
+        u[0] = simd.mul_add_f64s(decay[0], u[0], sum);
+    }
+}
+
+/// `c <- tanh u` for `columns` columns.
+#[inline(always)]
+pub(crate) fn activate<S: Simd>(simd: S, packed: &Packed, internal: &[f64], states: &mut [f64], columns: usize) {
+    let columns = internal.chunks_exact(packed.rows).zip(states.chunks_exact_mut(packed.state_stride)).take(columns);
+    for (u, state) in columns {
+        let (u, _) = S::as_simd_f64s(u);
+        let (c, _) = S::as_mut_simd_f64s(&mut state[..packed.rows]);
+        for (c, u) in c.iter_mut().zip(u) {
+            *c = tanh(simd, *u);
+        }
+    }
+}
+
+/// Puts initial states, one of N_C values for each item, into the running internal states.
+pub(crate) fn start(packed: &Packed, block: &Block, initial: &[f64], trajectory: &mut Trajectory) {
+    for (&item, u) in block.items.iter().zip(trajectory.internal.chunks_exact_mut(packed.rows)) {
+        u.fill(0.0);
+        u[..packed.n_c].copy_from_slice(&initial[item * packed.n_c..(item + 1) * packed.n_c]);
+    }
+}
+
+/// Prepares a span: its inputs, and the context where it starts.
+#[inline(always)]
+pub(crate) fn enter_span<S: Simd>(
+    simd: S,
+    packed: &Packed,
+    block: &Block,
+    span: std::ops::Range<usize>,
+    trajectory: &mut Trajectory,
+) {
+    let (n, stride) = (block.columns(), packed.state_stride);
+    for (row, states) in span.zip(trajectory.states.chunks_exact_mut(n * stride)) {
+        let inputs = block.sample_row(row).chunks_exact(packed.n_x);
+        for (x, state) in inputs.zip(states.chunks_exact_mut(stride)) {
+            state[packed.rows..packed.rows + packed.n_x].copy_from_slice(x);
+            state[packed.rows + packed.n_x] = 1.0;
+        }
+    }
+    activate(simd, packed, &trajectory.internal, &mut trajectory.states, n);
+}
+
+/// Runs the products of `range`, which lies in the span that starts at `span_start`; `record` keeps the outputs.
+#[inline(always)]
+pub(crate) fn run<S: Simd>(
+    simd: S,
+    packed: &Packed,
+    block: &Block,
+    range: std::ops::Range<usize>,
+    span_start: usize,
+    record: bool,
+    trajectory: &mut Trajectory,
+) {
+    let (n, stride, rows) = (block.columns(), packed.state_stride, packed.rows);
+    let (n_x, n_c) = (packed.n_x, packed.n_c);
+    let variance = packed.n_out > n_x;
+    for k in range {
+        let active = block.active(k);
+        let at = (k - span_start) * n * stride;
+        let (now, next) = trajectory.states[at..at + 2 * n * stride].split_at_mut(n * stride);
+        let sources = [Columns { values: &now[rows..], stride }, Columns { values: now, stride }];
+        let internal = &mut trajectory.internal[..n * rows];
+        let mut advance = Advance { internal, decay: &packed.decay, rows };
+        let matrices = [&packed.from_input, &packed.from_context];
+        multiply(simd, Product { matrices, sources, columns: active, start: &packed.bias }, &mut advance);
+        activate(simd, packed, internal, next, active);
+        if record && k > 0 {
+            let out = (k - 1) * n * n_x;
+            for column in 0..active {
+                let y = &next[column * stride + n_c..][..n_x];
+                trajectory.mean[out + column * n_x..][..n_x].copy_from_slice(y);
+                if variance {
+                    let u = &internal[column * rows + n_c + n_x..][..n_x];
+                    trajectory.variance[out + column * n_x..][..n_x].copy_from_slice(u);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parameters::Parameters;
+    use crate::topology::{Group, Prediction, Topology};
+
+    fn set(parameters: &mut Parameters, values: &[(Parameter, &[f64])]) {
+        for (block, values) in values {
+            parameters.block_mut(*block).copy_from_slice(values);
+        }
+    }
+
+    #[test]
+    fn one_unit_by_hand() {
+        let topology = Topology::s_ctrnn(1, 1, 2.0).unwrap();
+        let mut parameters = Parameters::zeros(&topology);
+        set(
+            &mut parameters,
+            &[
+                (Parameter::ContextFromInput, &[0.5]),
+                (Parameter::ContextFromContext, &[-1.0]),
+                (Parameter::ContextBias, &[0.25]),
+                (Parameter::MeanFromContext, &[2.0]),
+                (Parameter::MeanBias, &[-0.5]),
+                (Parameter::VarianceFromContext, &[1.0]),
+                (Parameter::VarianceBias, &[-3.0]),
+            ],
+        );
+        let network = Network { topology, parameters };
+        let mut plain = Plain::new(&network, &[1.0]);
+        plain.step(&[0.8]);
+        // u = 0.5 * 1 + 0.5 * (0.4 - tanh 1 + 0.25) = 0.825 - 0.380797077977882
+        assert!((plain.u[0] - 0.444_202_922_022_118).abs() < 1e-14);
+        // tanh 0.444202922022118 = 0.417137253072...; y = tanh(2 c - 0.5), v = exp(c - 3)
+        let c = (0.444_202_922_022_118_f64.exp() - (-0.444_202_922_022_118_f64).exp())
+            / (0.444_202_922_022_118_f64.exp() + (-0.444_202_922_022_118_f64).exp());
+        assert!((plain.c[0] - c).abs() < 1e-14);
+        assert!((plain.y[0] - (2.0 * c - 0.5).tanh()).abs() < 1e-14);
+        assert!((plain.v[0] - (c - 3.0).exp()).abs() < 1e-15);
+    }
+
+    #[test]
+    fn without_recurrence_a_unit_relaxes_by_the_closed_form() {
+        // tau du/dt = -u + b in steps of 1: u_t = b + (u_0 - b) (1 - 1/tau)^t
+        let groups = vec![Group::full("context", 1, 10.0)];
+        let topology = Topology::new(1, 1, groups, Prediction::Mean).unwrap();
+        let mut parameters = Parameters::zeros(&topology);
+        set(&mut parameters, &[(Parameter::ContextBias, &[0.7])]);
+        let network = Network { topology, parameters };
+        let mut plain = Plain::new(&network, &[-1.0]);
+        for t in 1..=50 {
+            plain.step(&[123.0]);
+            let closed = 0.7 + (-1.0 - 0.7) * 0.9_f64.powi(t);
+            assert!((plain.u[0] - closed).abs() < 1e-13, "step {t}: {} instead of {closed}", plain.u[0]);
+        }
+    }
+
+    #[test]
+    fn the_input_passes_slow_units_by_in_its_first_step() {
+        let groups = vec![Group::fast(2, 2.0), Group::slow(1, 20.0)];
+        let topology = Topology::new(1, 1, groups, Prediction::MeanAndVariance { floor: 0.0 }).unwrap();
+        let (network, _) = crate::initialization::initialize(&topology, 1, 3);
+        let run = |x: f64| {
+            let mut plain = Plain::new(&network, &[0.0, 0.0, 0.5]);
+            plain.step(&[x]);
+            let first = plain.u[2];
+            plain.step(&[x]);
+            (first, plain.u[2])
+        };
+        assert_eq!(run(0.9).0, run(-0.9).0);
+        assert_ne!(run(0.9).1, run(-0.9).1);
+    }
+}

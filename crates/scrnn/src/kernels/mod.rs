@@ -1,0 +1,57 @@
+//! Arithmetic on slices, in safe SIMD; a plain reference stands beside every fast version.
+//!
+//! Nothing here knows a network. Vectors run over rows (units); a block's columns (sequences, starts, samples) lie side
+//! by side. Row counts are padded to [`ROWS`], so that memory looks the same under every instruction set, and every
+//! element is summed in one fixed order of fused multiply-adds: all instruction sets give the same bits.
+
+pub mod activation;
+pub mod outer;
+pub mod panels;
+pub mod reference;
+
+/// Rows are padded to a multiple of this: the widest vector, eight f64.
+pub const ROWS: usize = 8;
+
+/// `count` rounded up to whole vectors.
+#[must_use]
+pub const fn padded(count: usize) -> usize {
+    count.next_multiple_of(ROWS)
+}
+
+/// A row stride for `count` values: whole vectors, and an odd number of cache lines, so that rows far apart do not
+/// fall into the same cache set.
+#[must_use]
+pub const fn stride(count: usize) -> usize {
+    let lines = count.div_ceil(ROWS);
+    (lines | 1) * ROWS
+}
+
+/// How many accumulators a tile may hold: three quarters of the registers, the rest is for operands. Where there are no
+/// vector registers at all, one: then a tile is only code to compile.
+const fn accumulators<S: pulp::Simd>() -> usize {
+    match S::REGISTER_COUNT {
+        32.. => 24,
+        16..32 => 12,
+        _ => 1,
+    }
+}
+
+/// Vectors of rows that a tile covers at most.
+const fn tallest<S: pulp::Simd>() -> usize {
+    match S::REGISTER_COUNT {
+        32.. => 4,
+        16..32 => 2,
+        _ => 1,
+    }
+}
+
+/// Whether a tile of so many vectors and columns is ever asked for, with `chains` interleaved sums: all others need not
+/// be compiled.
+const fn is_used<S: pulp::Simd>(vectors: usize, columns: usize, chains: usize) -> bool {
+    // Rows come in whole groups of ROWS: narrow vectors always fill a tile.
+    let group = ROWS / S::F64_LANES;
+    let least = if group < tallest::<S>() { group } else { tallest::<S>() };
+    vectors <= tallest::<S>()
+        && vectors.is_multiple_of(least)
+        && (columns == 1 || vectors * columns * chains <= accumulators::<S>())
+}

@@ -1,0 +1,133 @@
+//! The weight gradient as one product over all steps and columns of a block.
+//!
+//! ```text
+//! gradient[k, row] += sum_n delta[n, row] * state[n, k]
+//! ```
+//!
+//! n runs over (step, column) in memory order. Tiles of a few vectors of rows and six k stay in registers while n runs.
+
+use pulp::{Simd, WithSimd};
+
+use super::{ROWS, accumulators, is_used, tallest};
+
+/// Rows of values at equal distance.
+#[derive(Debug, Clone, Copy)]
+pub struct Rows<'a> {
+    /// All rows.
+    pub values: &'a [f64],
+    /// Distance between rows.
+    pub stride: usize,
+}
+
+/// Accumulates `count` outer products. `gradient` holds one row of `rows` values (a multiple of [`ROWS`]) for each k in
+/// `from..to`, in that order.
+#[inline(always)]
+pub fn accumulate<S: Simd>(
+    simd: S,
+    delta: Rows<'_>,
+    state: Rows<'_>,
+    count: usize,
+    rows: usize,
+    (from, to): (usize, usize),
+    gradient: &mut [f64],
+) {
+    debug_assert!(rows.is_multiple_of(ROWS) && gradient.len() >= (to - from) * rows);
+    let vectors = rows / S::F64_LANES;
+    let bands = vectors.div_ceil(tallest::<S>()).max(1);
+    let mut first = 0;
+    for band in 0..bands {
+        let height = vectors / bands + usize::from(band < vectors % bands);
+        let job = Job { delta, state, count, rows, row: first * S::F64_LANES, from, to };
+        match height {
+            4 => tiles::<S, 4>(simd, &job, gradient),
+            3 => tiles::<S, 3>(simd, &job, gradient),
+            2 => tiles::<S, 2>(simd, &job, gradient),
+            1 => tiles::<S, 1>(simd, &job, gradient),
+            _ => {}
+        }
+        first += height;
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Job<'a> {
+    delta: Rows<'a>,
+    state: Rows<'a>,
+    count: usize,
+    rows: usize,
+    row: usize,
+    from: usize,
+    to: usize,
+}
+
+#[inline(always)]
+fn tiles<S: Simd, const M: usize>(simd: S, job: &Job<'_>, gradient: &mut [f64]) {
+    let widest = (accumulators::<S>() / M).clamp(1, 6);
+    let columns = job.to - job.from;
+    let tiles = columns.div_ceil(widest);
+    let mut first = 0;
+    for tile in 0..tiles {
+        let width = columns / tiles + usize::from(tile < columns % tiles);
+        match width {
+            6 => enter::<S, M, 6>(simd, job, first, gradient),
+            5 => enter::<S, M, 5>(simd, job, first, gradient),
+            4 => enter::<S, M, 4>(simd, job, first, gradient),
+            3 => enter::<S, M, 3>(simd, job, first, gradient),
+            2 => enter::<S, M, 2>(simd, job, first, gradient),
+            1 => enter::<S, M, 1>(simd, job, first, gradient),
+            _ => {}
+        }
+        first += width;
+    }
+}
+
+/// A function of its own, see [`super::panels`].
+#[inline(never)]
+fn enter<S: Simd, const M: usize, const N: usize>(simd: S, job: &Job<'_>, first: usize, gradient: &mut [f64]) {
+    if is_used::<S>(M, N, 1) {
+        simd.vectorize(Tile::<M, N> { job, first, gradient });
+    }
+}
+
+/// M vectors of rows by N values of k.
+struct Tile<'a, const M: usize, const N: usize> {
+    job: &'a Job<'a>,
+    first: usize,
+    gradient: &'a mut [f64],
+}
+
+impl<const M: usize, const N: usize> WithSimd for Tile<'_, M, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { job, first, gradient } = self;
+        let lanes = S::F64_LANES;
+        let mut sums = [[simd.splat_f64s(0.0); N]; M];
+        for n in 0..N {
+            let (out, _) = S::as_simd_f64s(&gradient[(first + n) * job.rows + job.row..][..M * lanes]);
+            for m in 0..M {
+                sums[m][n] = out[m];
+            }
+        }
+        let deltas = job.delta.values.chunks(job.delta.stride);
+        let states = job.state.values.chunks(job.state.stride);
+        let k = job.from + first;
+        for (delta, state) in deltas.zip(states).take(job.count) {
+            let (delta, _) = S::as_simd_f64s(&delta[job.row..job.row + M * lanes]);
+            let state = &state[k..k + N];
+            for n in 0..N {
+                let x = simd.splat_f64s(state[n]);
+                for m in 0..M {
+                    sums[m][n] = simd.mul_add_f64s(delta[m], x, sums[m][n]);
+                }
+            }
+        }
+        for n in 0..N {
+            let (out, _) = S::as_mut_simd_f64s(&mut gradient[(first + n) * job.rows + job.row..][..M * lanes]);
+            for m in 0..M {
+                out[m] = sums[m][n];
+            }
+        }
+    }
+}

@@ -1,0 +1,188 @@
+//! Adam (Kingma and Ba 2015) with warm-up, cosine decay and clipping, on g = d(ln L per step and channel).
+//!
+//! ```text
+//! m <- beta1 m + (1 - beta1) g,   q <- beta2 q + (1 - beta2) g^2
+//! theta <- theta + rate(n) (m / (1 - beta1^n)) / (sqrt(q / (1 - beta2^n)) + epsilon)
+//! ```
+//!
+//! Initial states are written u_0 = mean + s z, s = min(sigma_IS, 1). Then d ln L_all / dz = s d ln L_out / du_0 -
+//! (s / sigma_IS)^2 z, and moving the mean moves all u_0 with it, so its gradient has no prior term: neither is stiff,
+//! however narrow the prior.
+
+use super::plan::Adam;
+use super::state::Fields;
+use crate::initial_states::InitialStates;
+use crate::parameters::{Gradients, Parameters};
+use crate::topology::Topology;
+
+/// First and second moments of one list of parameters.
+#[derive(Debug, Clone)]
+struct Moments {
+    first: Vec<f64>,
+    second: Vec<f64>,
+}
+
+impl Moments {
+    fn new(len: usize) -> Self {
+        Self { first: vec![0.0; len], second: vec![0.0; len] }
+    }
+
+    /// Moves `values` along `gradient`; `update` is the number of this update, from 1.
+    fn ascend(&mut self, adam: &Adam, update: u64, rate: f64, gradient: &[f64], values: &mut [f64]) {
+        let power = |beta: f64| 1.0 - beta.powf(update as f64);
+        let (correct_first, correct_second) = (1.0 / power(adam.beta1), 1.0 / power(adam.beta2));
+        for (((value, g), m), q) in values.iter_mut().zip(gradient).zip(&mut self.first).zip(&mut self.second) {
+            *m = adam.beta1 * *m + (1.0 - adam.beta1) * g;
+            *q = adam.beta2 * *q + (1.0 - adam.beta2) * (g * g);
+            *value += rate * (*m * correct_first) / ((*q * correct_second).sqrt() + adam.epsilon);
+        }
+    }
+}
+
+/// What the rule remembers.
+#[derive(Debug, Clone)]
+pub(super) struct AdamRule {
+    options: Adam,
+    shared: Moments,
+    initial: Moments,
+    mean: Moments,
+    epochs: u64,
+    /// T_total N_O, and the average of T N_O over sequences.
+    terms: (f64, f64),
+    /// s, and (s / sigma_IS)^2.
+    spread: (f64, f64),
+    learns: Vec<bool>,
+    scratch: Vec<f64>,
+    z: Vec<f64>,
+}
+
+impl AdamRule {
+    pub fn new(
+        options: Adam,
+        topology: &Topology,
+        states: &InitialStates,
+        total_steps: usize,
+        variance: f64,
+        epochs: u64,
+    ) -> Self {
+        let parameters = Parameters::zeros(topology).as_slice().len();
+        let terms = (total_steps * topology.channels()) as f64;
+        let s = variance.sqrt().min(1.0);
+        Self {
+            options,
+            shared: Moments::new(parameters),
+            initial: Moments::new(states.values().len()),
+            mean: Moments::new(states.mean().len()),
+            epochs,
+            terms: (terms, terms / states.sequences() as f64),
+            spread: (s, s * s / variance),
+            learns: topology.per_unit(|group| group.learns_initial_state).collect(),
+            scratch: vec![0.0; parameters.max(states.values().len())],
+            z: vec![0.0; states.values().len()],
+        }
+    }
+
+    /// The rate of the update that follows epoch `epoch`.
+    pub fn rate(&self, epoch: u64) -> f64 {
+        let Adam { rate, warm_up, final_rate, .. } = self.options;
+        let warm = (warm_up * self.epochs as f64).round();
+        let at = epoch as f64;
+        if at < warm {
+            return rate * (at + 1.0) / warm;
+        }
+        let left = (self.epochs as f64 - warm).max(1.0);
+        let phase = ((at - warm) / left).min(1.0) * std::f64::consts::PI;
+        final_rate + (rate - final_rate) * 0.5 * (1.0 + phase.cos())
+    }
+
+    /// The rates for shared parameters and initial states.
+    pub fn rates(&self, epoch: u64) -> (f64, f64) {
+        let rate = self.rate(epoch);
+        (rate, rate * self.options.initial_state_factor)
+    }
+
+    /// One update from the gradients of ln L_out.
+    pub fn ascend(
+        &mut self,
+        epoch: u64,
+        gradients: &Gradients,
+        initial: &[f64],
+        parameters: &mut Parameters,
+        states: &mut InitialStates,
+    ) {
+        let adam = self.options.clone();
+        let (update, rate) = (epoch + 1, self.rate(epoch));
+
+        let norm = gradients.as_slice().iter().map(|g| g * g).sum::<f64>().sqrt() / self.terms.0;
+        let clip = if adam.clip_norm > 0.0 && norm > adam.clip_norm { adam.clip_norm / norm } else { 1.0 };
+        let scratch = &mut self.scratch[..gradients.as_slice().len()];
+        for (out, g) in scratch.iter_mut().zip(gradients.as_slice()) {
+            *out = g * (clip / self.terms.0);
+        }
+        self.shared.ascend(&adam, update, rate, scratch, parameters.as_mut_slice());
+
+        let units = self.learns.len();
+        let (s, pull) = self.spread;
+        let scratch = &mut self.scratch[..initial.len()];
+        for (index, (out, g)) in scratch.iter_mut().zip(initial).enumerate() {
+            let i = index % units;
+            self.z[index] = if self.learns[i] { (states.values()[index] - states.mean()[i]) / s } else { 0.0 };
+            *out = if self.learns[i] { (s * g - pull * self.z[index]) / self.terms.1 } else { 0.0 };
+        }
+        self.initial.ascend(&adam, update, rate * adam.initial_state_factor, scratch, &mut self.z);
+
+        let scratch = &mut self.scratch[..units];
+        for (i, out) in scratch.iter_mut().enumerate() {
+            *out = initial.iter().skip(i).step_by(units).sum::<f64>() / self.terms.0;
+        }
+        self.mean.ascend(&adam, update, rate * adam.mean_factor, scratch, states.mean_mut());
+        for (index, z) in self.z.iter().enumerate() {
+            let i = index % units;
+            if self.learns[i] {
+                let mean = states.mean()[i];
+                states.values_mut()[index] = mean + s * z;
+            }
+        }
+    }
+
+    /// What has to be kept to go on.
+    pub fn fields(&mut self) -> Fields<'_> {
+        let (parameters, units) = (self.shared.first.len(), self.learns.len());
+        let states = vec![self.initial.first.len() / units, units];
+        Fields {
+            tensors: vec![
+                ("first_moment.shared", vec![parameters], &mut self.shared.first),
+                ("second_moment.shared", vec![parameters], &mut self.shared.second),
+                ("first_moment.initial_state", states.clone(), &mut self.initial.first),
+                ("second_moment.initial_state", states, &mut self.initial.second),
+                ("first_moment.initial_state_mean", vec![units], &mut self.mean.first),
+                ("second_moment.initial_state_mean", vec![units], &mut self.mean.second),
+            ],
+            numbers: Vec::new(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rate_rises_and_falls_on_its_schedule() {
+        let topology = Topology::s_ctrnn(1, 2, 2.0).unwrap();
+        let states = InitialStates::zeros(&topology, 1);
+        let adam = Adam { rate: 2.0, warm_up: 0.1, final_rate: 0.5, ..Adam::default() };
+        let rule = AdamRule::new(adam, &topology, &states, 10, 1.0, 100);
+        assert_eq!((rule.rate(0), rule.rate(9), rule.rate(10)), (0.2, 2.0, 2.0));
+        assert!((rule.rate(55) - 1.25).abs() < 1e-12);
+        assert!((rule.rate(100) - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_first_update_is_one_rate_long() {
+        let mut moments = Moments::new(3);
+        let mut values = [0.0; 3];
+        moments.ascend(&Adam::default(), 1, 0.1, &[5.0, -1e-3, 0.0], &mut values);
+        assert!((values[0] - 0.1).abs() < 1e-6 && (values[1] + 0.1).abs() < 1e-5 && values[2] == 0.0);
+    }
+}

@@ -1,0 +1,337 @@
+//! The loop of learning: evaluate, report, ascend.
+
+use super::adam::AdamRule;
+use super::divergence::Divergence;
+use super::momentum::MomentumRule;
+use super::plan::{Optimiser, Plan};
+use super::state::Fields;
+use crate::batch::Item;
+use crate::checkpoint::OptimiserState;
+use crate::dataset::Dataset;
+use crate::engine::Engine;
+use crate::error::{Error, Result};
+use crate::initial_states::InitialStates;
+use crate::network::Network;
+use crate::objective::{Objective, Want};
+
+/// Whether to go on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Control {
+    /// Go on.
+    Continue,
+    /// Stop before the next update.
+    Stop,
+}
+
+/// What the evaluation of an epoch found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EpochReport {
+    /// Updates made so far; 0 is the initial network.
+    pub epoch: u64,
+    /// ln L_out in nats over all sequences (2.11); without variance units -E (A.22).
+    pub ln_likelihood: f64,
+    /// -ln L_out in nats per step and channel, in the network's units; none without variance units.
+    pub nll: Option<f64>,
+    /// Squared error per step and channel, in the network's units.
+    pub mse: f64,
+    /// ln L_init in nats (2.16).
+    pub ln_prior: f64,
+    /// The rate for shared parameters.
+    pub rate_shared: f64,
+    /// The rate for initial states.
+    pub rate_initial: f64,
+    /// Length of the gradient of ln L_out per step and channel in the shared parameters.
+    pub gradient_norm: f64,
+}
+
+/// Watches a training, and can stop it.
+pub trait Observer {
+    /// Called after each evaluation, before the update. A run of N epochs makes N + 1 calls, the last with the final
+    /// parameters. `learner` holds what was evaluated: saved here and restored later, a training goes on bit for bit.
+    fn epoch(&mut self, report: &EpochReport, learner: &Learner) -> Control;
+}
+
+impl<F: FnMut(&EpochReport, &Learner) -> Control> Observer for F {
+    fn epoch(&mut self, report: &EpochReport, learner: &Learner) -> Control {
+        self(report, learner)
+    }
+}
+
+/// How a training ended.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// All epochs are done.
+    Finished,
+    /// The observer stopped it.
+    Stopped,
+    /// A value was not finite; the learner is back at the last good state.
+    Diverged(Divergence),
+}
+
+#[derive(Debug, Clone)]
+enum Rule {
+    Momentum(MomentumRule),
+    Adam(AdamRule),
+}
+
+impl Rule {
+    fn fields(&mut self) -> Fields<'_> {
+        match self {
+            Self::Momentum(rule) => rule.fields(),
+            Self::Adam(rule) => rule.fields(),
+        }
+    }
+}
+
+/// The part of a learner that an update changes.
+#[derive(Debug, Clone)]
+struct State {
+    network: Network,
+    initial_states: InitialStates,
+    rule: Rule,
+    epoch: u64,
+}
+
+impl State {
+    /// Takes over another state of the same training; allocates nothing.
+    fn copy_from(&mut self, other: &mut Self) {
+        self.network.parameters.as_mut_slice().copy_from_slice(other.network.parameters.as_slice());
+        self.initial_states.values_mut().copy_from_slice(other.initial_states.values());
+        self.initial_states.mean_mut().copy_from_slice(other.initial_states.mean());
+        let (own, others) = (self.rule.fields(), other.rule.fields());
+        for (own, other) in own.tensors.into_iter().zip(others.tensors) {
+            own.2.copy_from_slice(other.2);
+        }
+        for (own, other) in own.numbers.into_iter().zip(others.numbers) {
+            *own.1 = *other.1;
+        }
+        self.epoch = other.epoch;
+    }
+}
+
+/// A network in training on a data set.
+#[derive(Debug)]
+pub struct Learner {
+    state: State,
+    last_good: State,
+    plan: Plan,
+    data: Dataset,
+    terms: f64,
+    objective: Objective,
+    engine: Engine,
+    /// Whether the objective already holds the values of the present state.
+    evaluated: bool,
+}
+
+impl Learner {
+    /// A learner at epoch 0. `data` must be in the network's units.
+    ///
+    /// # Errors
+    /// A plan out of range, data that do not fit the network, or initial states for another number of sequences.
+    pub fn new(
+        network: Network,
+        initial_states: InitialStates,
+        data: &Dataset,
+        plan: Plan,
+        engine: &Engine,
+    ) -> Result<Self> {
+        plan.check()?;
+        let topology = &network.topology;
+        data.check_for(topology)?;
+        let sequences = data.sequences().len();
+        if initial_states.sequences() != sequences {
+            let what = "the list of initial states".to_owned();
+            return Err(Error::Length { what, found: initial_states.sequences(), needed: sequences });
+        }
+        let delay = topology.delay();
+        let items: Vec<Item<'_>> = data
+            .sequences()
+            .iter()
+            .map(|sequence| Item { samples: sequence.values(), steps: sequence.len() - delay })
+            .collect();
+        let total = data.total_steps(delay);
+        let variance = plan.initial_state_variance;
+        let rule = match &plan.optimiser {
+            Optimiser::Momentum(options) => {
+                Rule::Momentum(MomentumRule::new(options.clone(), topology, &initial_states, total, variance))
+            }
+            Optimiser::Adam(options) => {
+                let options = options.clone();
+                Rule::Adam(AdamRule::new(options, topology, &initial_states, total, variance, plan.epochs))
+            }
+        };
+        let objective = Objective::new(topology, &items, plan.recompute);
+        let terms = (total * topology.channels()) as f64;
+        let state = State { network, initial_states, rule, epoch: 0 };
+        Ok(Self {
+            last_good: state.clone(),
+            state,
+            plan,
+            data: data.clone(),
+            terms,
+            objective,
+            engine: engine.clone(),
+            evaluated: false,
+        })
+    }
+
+    /// Goes on from a checkpoint, of which `new` got the network and the initial states.
+    ///
+    /// # Errors
+    /// [`Error::Checkpoint`] if the state is of another optimiser or of other sizes.
+    pub fn restore(&mut self, epoch: u64, state: &OptimiserState) -> Result<()> {
+        self.state.rule.fields().load(state)?;
+        self.state.epoch = epoch;
+        self.evaluated = false;
+        Ok(())
+    }
+
+    /// The network as it is.
+    #[must_use]
+    pub fn network(&self) -> &Network {
+        &self.state.network
+    }
+
+    /// The initial states as they are.
+    #[must_use]
+    pub fn initial_states(&self) -> &InitialStates {
+        &self.state.initial_states
+    }
+
+    /// Updates made so far.
+    #[must_use]
+    pub fn epoch(&self) -> u64 {
+        self.state.epoch
+    }
+
+    /// The plan.
+    #[must_use]
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The optimiser's memory.
+    #[must_use]
+    pub fn optimiser_state(&self) -> OptimiserState {
+        self.state.rule.clone().fields().save()
+    }
+
+    /// ln L_out of each sequence at the last evaluation, in nats; -E without variance units.
+    #[must_use]
+    pub fn ln_likelihoods(&self) -> &[f64] {
+        &self.objective.ln_likelihood
+    }
+
+    /// Learns to the end of the plan, or until the observer stops it.
+    pub fn run(&mut self, observer: &mut dyn Observer) -> Outcome {
+        self.last_good.copy_from(&mut self.state);
+        loop {
+            self.evaluate();
+            if let Some(divergence) = self.divergence() {
+                self.state.copy_from(&mut self.last_good);
+                self.evaluated = false;
+                return Outcome::Diverged(divergence);
+            }
+            self.last_good.copy_from(&mut self.state);
+            let control = observer.epoch(&self.report(), self);
+            if self.state.epoch >= self.plan.epochs {
+                return Outcome::Finished;
+            }
+            if control == Control::Stop {
+                return Outcome::Stopped;
+            }
+            self.update();
+            self.state.epoch += 1;
+        }
+    }
+
+    fn evaluate(&mut self) {
+        if !self.evaluated {
+            self.objective.set_parameters(&self.state.network.parameters);
+            self.objective.evaluate(self.state.initial_states.values(), Want::Everything, &self.engine);
+            self.evaluated = true;
+        }
+    }
+
+    fn divergence(&self) -> Option<Divergence> {
+        let State { network, initial_states, epoch, .. } = &self.state;
+        let finite =
+            |s: usize| self.objective.ln_likelihood[s].is_finite() && self.objective.squared_error[s].is_finite();
+        let mut divergence = if let Some(s) = (0..self.objective.ln_likelihood.len()).find(|&s| !finite(s)) {
+            Divergence::in_sequence(*epoch, network, initial_states, &self.data, s)
+        } else {
+            let gradients = &self.objective.gradients;
+            let all = gradients.as_slice().iter().chain(&self.objective.initial);
+            if all.into_iter().all(|g| g.is_finite()) {
+                return None;
+            }
+            Divergence::in_gradient(*epoch, gradients)
+        };
+        divergence.rolled_back_to = self.last_good.epoch;
+        Some(divergence)
+    }
+
+    fn report(&self) -> EpochReport {
+        let topology = &self.state.network.topology;
+        let ln_likelihood: f64 = self.objective.ln_likelihood.iter().sum();
+        let norm = self.objective.gradients.as_slice().iter().map(|g| g * g).sum::<f64>().sqrt();
+        let (rate_shared, rate_initial) = match &self.state.rule {
+            Rule::Momentum(rule) => rule.rates(),
+            Rule::Adam(rule) => rule.rates(self.state.epoch),
+        };
+        EpochReport {
+            epoch: self.state.epoch,
+            ln_likelihood,
+            nll: topology.has_variance().then_some(-ln_likelihood / self.terms),
+            mse: self.objective.squared_error.iter().sum::<f64>() / self.terms,
+            ln_prior: self.state.initial_states.ln_prior(topology, self.plan.initial_state_variance),
+            rate_shared,
+            rate_initial,
+            gradient_norm: norm / self.terms,
+        }
+    }
+
+    fn update(&mut self) {
+        let State { network, initial_states, rule, epoch } = &mut self.state;
+        let (gradients, initial) = (&self.objective.gradients, &self.objective.initial);
+        let (topology, parameters) = (&network.topology, &mut network.parameters);
+        self.evaluated = false;
+        match rule {
+            Rule::Adam(rule) => rule.ascend(*epoch, gradients, initial, parameters, initial_states),
+            Rule::Momentum(rule) => {
+                rule.accumulate(topology, gradients, initial, initial_states);
+                rule.apply(parameters, initial_states);
+                if rule.options.adaptive.is_some() {
+                    self.adapt();
+                }
+            }
+        }
+    }
+
+    /// Accepts the tentative update, or withdraws it and tries a lower rate (D.1). The last good state holds the
+    /// parameters before the update.
+    fn adapt(&mut self) {
+        let before: f64 = self.objective.squared_error.iter().sum();
+        let Rule::Momentum(rule) = &self.state.rule else { return };
+        let Some(options) = rule.options.adaptive.clone() else { return };
+        for _ in 1..options.max_tries {
+            self.evaluated = false;
+            self.evaluate();
+            let ratio = self.objective.squared_error.iter().sum::<f64>() / before;
+            let State { network, initial_states, rule: Rule::Momentum(rule), .. } = &mut self.state else { return };
+            if ratio <= options.max_error_ratio {
+                if ratio < 1.0 {
+                    rule.factor *= options.increase;
+                }
+                return;
+            }
+            rule.factor *= options.decrease;
+            let good = &self.last_good;
+            network.parameters.as_mut_slice().copy_from_slice(good.network.parameters.as_slice());
+            initial_states.values_mut().copy_from_slice(good.initial_states.values());
+            initial_states.mean_mut().copy_from_slice(good.initial_states.mean());
+            rule.apply(&mut network.parameters, initial_states);
+        }
+        self.evaluated = false;
+    }
+}

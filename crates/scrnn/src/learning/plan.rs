@@ -1,0 +1,170 @@
+//! What to do: epochs, the prior's variance, and an optimiser with its options.
+
+use crate::error::{Error, Result};
+
+/// A training.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// Number of updates.
+    pub epochs: u64,
+    /// sigma^2_IS, the variance of the initial states around their mean (2.13).
+    pub initial_state_variance: f64,
+    /// How to ascend.
+    pub optimiser: Optimiser,
+    /// Keep only a part of the states and compute the rest again on the way back: memory grows with the square root of
+    /// the sequences' length, time by a third, and the bits stay the same.
+    pub recompute: bool,
+}
+
+impl Default for Plan {
+    fn default() -> Self {
+        Self {
+            epochs: 100_000,
+            initial_state_variance: 1.0,
+            optimiser: Optimiser::Momentum(Momentum::default()),
+            recompute: false,
+        }
+    }
+}
+
+/// How to ascend.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Optimiser {
+    /// Gradient ascent with momentum, the thesis' rule (2.17)-(2.19).
+    Momentum(Momentum),
+    /// Adam with warm-up, cosine decay and clipping.
+    Adam(Adam),
+}
+
+/// Gradient ascent with momentum. With T_total steps in all and N_O channels, shared parameters ascend at
+/// alpha / (T_total N_O) and initial states at alpha / N_O (2.7).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Momentum {
+    /// alpha-tilde.
+    pub rate: f64,
+    /// eta, at least 0 and below 1.
+    pub momentum: f64,
+    /// How the prior acts on initial states and their mean.
+    pub prior: PriorStep,
+    /// Whether the rate adapts (D.1).
+    pub adaptive: Option<AdaptiveRate>,
+}
+
+impl Default for Momentum {
+    fn default() -> Self {
+        Self { rate: 1e-4, momentum: 0.9, prior: PriorStep::Implicit, adaptive: None }
+    }
+}
+
+/// How the prior (2.23), (2.24) enters a step of gradient ascent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PriorStep {
+    /// Solved for where the step ends: stable for any variance, and the literal rule where that is stable.
+    Implicit,
+    /// As printed; unstable for narrow priors.
+    Thesis,
+}
+
+/// The adaptive rate (D.1): one factor on both rates. An update that lets the squared error grow by more than
+/// `max_error_ratio` is withdrawn and tried again at a lower rate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AdaptiveRate {
+    /// r_th.
+    pub max_error_ratio: f64,
+    /// alpha_dec.
+    pub decrease: f64,
+    /// alpha_inc.
+    pub increase: f64,
+    /// Tries for each epoch.
+    pub max_tries: u32,
+}
+
+impl Default for AdaptiveRate {
+    fn default() -> Self {
+        Self { max_error_ratio: 1.1, decrease: 0.7, increase: 1.05, max_tries: 1000 }
+    }
+}
+
+/// Adam on the gradient of ln L per step and channel. Initial states are written u_0 = mean + s z with
+/// s = min(sigma_IS, 1), and Adam moves z and the mean: no prior is too narrow for it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Adam {
+    /// The largest rate.
+    pub rate: f64,
+    /// Share of the epochs in which the rate rises from 0.
+    pub warm_up: f64,
+    /// The rate at the end of the cosine.
+    pub final_rate: f64,
+    /// Longest gradient of the shared parameters; 0 leaves it as it is.
+    pub clip_norm: f64,
+    /// Factor on the rate for initial states.
+    pub initial_state_factor: f64,
+    /// Factor on the rate for their mean.
+    pub mean_factor: f64,
+    /// Decay of the first moment.
+    pub beta1: f64,
+    /// Decay of the second moment.
+    pub beta2: f64,
+    /// Added to the root of the second moment.
+    pub epsilon: f64,
+}
+
+impl Default for Adam {
+    fn default() -> Self {
+        Self {
+            rate: 3e-3,
+            warm_up: 0.02,
+            final_rate: 0.0,
+            clip_norm: 1.0,
+            initial_state_factor: 3.0,
+            mean_factor: 3.0,
+            beta1: 0.9,
+            beta2: 0.999,
+            epsilon: 1e-8,
+        }
+    }
+}
+
+impl Plan {
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] names the first one that is out of its range.
+    pub fn check(&self) -> Result<()> {
+        let positive = |what, value: f64| require(what, value, value > 0.0, "a positive number");
+        let not_negative = |what, value: f64| require(what, value, value >= 0.0, "0 or a positive number");
+        let share = |what, value: f64| require(what, value, (0.0..1.0).contains(&value), "at least 0 and below 1");
+        positive("initial_state_variance", self.initial_state_variance)?;
+        match &self.optimiser {
+            Optimiser::Momentum(momentum) => {
+                positive("momentum.rate", momentum.rate)?;
+                share("momentum.momentum", momentum.momentum)?;
+                if let Some(adaptive) = &momentum.adaptive {
+                    let AdaptiveRate { max_error_ratio, decrease, increase, max_tries } = *adaptive;
+                    let at_least_1 = |what, value: f64| require(what, value, value >= 1.0, "at least 1");
+                    at_least_1("adaptive_rate.max_error_ratio", max_error_ratio)?;
+                    at_least_1("adaptive_rate.increase", increase)?;
+                    positive("adaptive_rate.decrease", decrease)?;
+                    share("adaptive_rate.decrease", decrease)?;
+                    at_least_1("adaptive_rate.max_tries", f64::from(max_tries))?;
+                }
+            }
+            Optimiser::Adam(adam) => {
+                positive("adam.rate", adam.rate)?;
+                share("adam.warm_up", adam.warm_up)?;
+                not_negative("adam.final_rate", adam.final_rate)?;
+                not_negative("adam.clip_norm", adam.clip_norm)?;
+                not_negative("adam.initial_state_factor", adam.initial_state_factor)?;
+                not_negative("adam.mean_factor", adam.mean_factor)?;
+                share("adam.beta1", adam.beta1)?;
+                share("adam.beta2", adam.beta2)?;
+                positive("adam.epsilon", adam.epsilon)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn require(what: &'static str, value: f64, holds: bool, needed: &'static str) -> Result<()> {
+    if holds && value.is_finite() { Ok(()) } else { Err(Error::Setting { what, found: value.to_string(), needed }) }
+}

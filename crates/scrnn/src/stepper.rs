@@ -1,0 +1,108 @@
+//! Step by step: for loops that need each prediction before they know the next input.
+//!
+//! Columns are independent copies of the network. The context's product and the outputs' product are taken apart, since
+//! the next input may be made from the outputs (2.25b).
+
+use aligned_vec::AVec;
+use pulp::Simd;
+
+use crate::forward::{Advance, activate};
+use crate::kernels::activation::{exp, tanh};
+use crate::kernels::padded;
+use crate::kernels::panels::{Columns, Product, multiply};
+use crate::packed::Packed;
+
+/// Copies of one network at one moment.
+#[derive(Debug)]
+pub(crate) struct Stepper {
+    columns: usize,
+    /// [column][state_stride]: c, then x.
+    states: AVec<f64>,
+    /// [column][rows].
+    internal: AVec<f64>,
+    /// [column][padded outputs]: u of the mean and variance units, and what becomes of them.
+    outputs: AVec<f64>,
+    mean: AVec<f64>,
+    variance: AVec<f64>,
+}
+
+impl Stepper {
+    pub fn new(packed: &Packed, columns: usize) -> Self {
+        let zeros = |count: usize| AVec::from_iter(64, std::iter::repeat_n(0.0, count));
+        let outputs = columns * padded(packed.n_out);
+        Self {
+            columns,
+            states: zeros(columns * packed.state_stride),
+            internal: zeros(columns * packed.rows),
+            outputs: zeros(outputs),
+            mean: zeros(outputs),
+            variance: zeros(outputs),
+        }
+    }
+
+    /// Starts a column from an initial state.
+    pub fn start(&mut self, packed: &Packed, column: usize, u0: &[f64]) {
+        let u = &mut self.internal[column * packed.rows..(column + 1) * packed.rows];
+        u.fill(0.0);
+        u[..packed.n_c].copy_from_slice(u0);
+    }
+
+    /// Computes the contexts of the initial states.
+    #[inline(always)]
+    pub fn enter<S: Simd>(&mut self, simd: S, packed: &Packed) {
+        activate(simd, packed, &self.internal, &mut self.states, self.columns);
+    }
+
+    /// The next input of a column, N_I values.
+    pub fn input(&mut self, packed: &Packed, column: usize) -> &mut [f64] {
+        &mut self.states[column * packed.state_stride + packed.rows..][..packed.n_x]
+    }
+
+    /// The context of a column, N_C values.
+    pub fn context(&self, packed: &Packed, column: usize) -> &[f64] {
+        &self.states[column * packed.state_stride..][..packed.n_c]
+    }
+
+    /// The predicted mean of a column, N_O values.
+    pub fn mean(&self, packed: &Packed, column: usize) -> &[f64] {
+        &self.mean[column * padded(packed.n_out)..][..packed.n_x]
+    }
+
+    /// exp u of the variance units of a column; empty without them. The floor is not in it.
+    pub fn variance(&self, packed: &Packed, column: usize) -> &[f64] {
+        &self.variance[column * padded(packed.n_out)..][packed.n_x..packed.n_out]
+    }
+
+    /// Takes the inputs in, and predicts.
+    #[inline(always)]
+    pub fn step<S: Simd>(&mut self, simd: S, packed: &Packed) {
+        let (rows, stride, columns) = (packed.rows, packed.state_stride, self.columns);
+        let matrices = [&packed.from_input, &packed.from_context];
+        let product = Product { matrices, sources: sources(&self.states, rows, stride), columns, start: &packed.bias };
+        multiply(simd, product, &mut Advance { internal: &mut self.internal, decay: &packed.decay, rows });
+        activate(simd, packed, &self.internal, &mut self.states, columns);
+
+        let matrices = [&packed.outputs_from_input, &packed.outputs];
+        let product = Product {
+            matrices,
+            sources: sources(&self.states, packed.rows, stride),
+            columns,
+            start: &packed.output_bias,
+        };
+        let rows = padded(packed.n_out);
+        multiply(simd, product, &mut Advance { internal: &mut self.outputs, decay: &packed.zeros, rows });
+        let (u, _) = S::as_simd_f64s(&self.outputs);
+        let (mean, _) = S::as_mut_simd_f64s(&mut self.mean);
+        let (variance, _) = S::as_mut_simd_f64s(&mut self.variance);
+        for ((y, v), u) in mean.iter_mut().zip(variance).zip(u) {
+            *y = tanh(simd, *u);
+            *v = exp(simd, *u);
+        }
+    }
+}
+
+/// The inputs and the contexts of all columns.
+#[inline(always)]
+fn sources(states: &[f64], rows: usize, stride: usize) -> [Columns<'_>; 2] {
+    [Columns { values: &states[rows..], stride }, Columns { values: states, stride }]
+}
