@@ -14,32 +14,35 @@
 use pulp::Simd;
 
 use crate::batch::Block;
+use crate::kernels::copy_few;
 use crate::kernels::outer::{Rows, accumulate};
-use crate::kernels::panels::{Columns, Finish, Product, multiply};
+use crate::kernels::panels::{Columns, Product, multiply};
 use crate::packed::Packed;
 use crate::trajectory::Trajectory;
 
-/// Turns sums over receivers into d/du of the senders.
-struct Retreat<'a> {
-    states: &'a [f64],
-    state_stride: usize,
-    after: &'a [f64],
-    before: &'a mut [f64],
-    delta_stride: usize,
-    decay: &'a [f64],
-}
-
-impl<S: Simd> Finish<S> for Retreat<'_> {
-    #[inline(always)]
-    fn finish(&mut self, simd: S, column: usize, row: usize, sum: S::f64s) {
-        let load = |list: &[f64], at: usize| S::as_simd_f64s(&list[at..at + S::F64_LANES]).0[0];
-        let c = load(self.states, column * self.state_stride + row);
-        let after = load(self.after, column * self.delta_stride + row);
-        let slope = simd.sub_f64s(simd.splat_f64s(1.0), simd.mul_f64s(c, c));
-        let kept = simd.mul_f64s(load(self.decay, row), after);
-        let at = column * self.delta_stride + row;
-        let (before, _) = S::as_mut_simd_f64s(&mut self.before[at..at + S::F64_LANES]);
-        before[0] = simd.mul_add_f64s(slope, sum, kept);
+/// `before <- (1 - c^2) sum + (1 - 1/tau) after` for the context units of `columns` columns (2.22).
+#[inline(always)]
+fn retreat<S: Simd>(
+    simd: S,
+    packed: &Packed,
+    sums: &[f64],
+    states: &[f64],
+    after: &[f64],
+    before: &mut [f64],
+    columns: usize,
+) {
+    let rows = packed.backward.rows();
+    let (decay, _) = S::as_simd_f64s(&packed.decay[..rows]);
+    for column in 0..columns {
+        let delta = column * packed.delta_stride;
+        let (sums, _) = S::as_simd_f64s(&sums[column * rows..][..rows]);
+        let (c, _) = S::as_simd_f64s(&states[column * packed.state_stride..][..rows]);
+        let (after, _) = S::as_simd_f64s(&after[delta..][..rows]);
+        let (before, _) = S::as_mut_simd_f64s(&mut before[delta..][..rows]);
+        for ((((before, after), c), sum), decay) in before.iter_mut().zip(after).zip(c).zip(sums).zip(decay) {
+            let slope = simd.negate_mul_add_f64s(*c, *c, simd.splat_f64s(1.0));
+            *before = simd.mul_add_f64s(slope, *sum, simd.mul_f64s(*decay, *after));
+        }
     }
 }
 
@@ -62,27 +65,28 @@ pub(crate) fn run<S: Simd>(
         let later = block.active(k + 1);
         let at = (k - first) * n * delta_stride;
         let (before, after) = trajectory.deltas[at..at + 2 * n * delta_stride].split_at_mut(n * delta_stride);
-        for (column, delta) in after.chunks_exact_mut(delta_stride).enumerate().take(active) {
+        for column in 0..active {
+            let delta = &mut after[column * delta_stride..][..n_c + packed.n_out];
             if column >= later {
                 delta[..n_c].fill(0.0);
             }
-            let outputs = &mut delta[n_c..n_c + packed.n_out];
+            let outputs = &mut delta[n_c..];
             if k == 0 {
                 outputs.fill(0.0);
             } else {
                 let step = ((k - 1) * n + column) * n_x;
-                outputs[..n_x].copy_from_slice(&trajectory.mean[step..step + n_x]);
+                copy_few(&mut outputs[..n_x], &trajectory.mean[step..step + n_x]);
                 if packed.n_out > n_x {
-                    outputs[n_x..].copy_from_slice(&trajectory.variance[step..step + n_x]);
+                    copy_few(&mut outputs[n_x..], &trajectory.variance[step..step + n_x]);
                 }
             }
         }
         let at = (k - span_start) * n * state_stride;
         let states = &trajectory.states[at..at + n * state_stride];
         let sources = [Columns { values: after, stride: delta_stride }];
-        let mut retreat = Retreat { states, state_stride, after, before, delta_stride, decay: &packed.decay };
         let matrices = [&packed.backward];
-        multiply(simd, Product { matrices, sources, columns: active, start: &packed.zeros }, &mut retreat);
+        multiply(simd, Product { matrices, sources, columns: active, start: &packed.zeros }, &mut trajectory.drive);
+        retreat(simd, packed, &trajectory.drive, states, after, before, active);
     }
 }
 

@@ -15,7 +15,8 @@ use pulp::Simd;
 
 use crate::batch::Block;
 use crate::kernels::activation::tanh;
-use crate::kernels::panels::{Columns, Finish, Product, multiply};
+use crate::kernels::copy_few;
+use crate::kernels::panels::{Columns, Product, multiply};
 use crate::network::Network;
 use crate::packed::Packed;
 use crate::parameters::Block as Parameter;
@@ -83,33 +84,35 @@ impl<'a> Plain<'a> {
     }
 }
 
-/// Takes the sums of the joint product into the internal states.
-pub(crate) struct Advance<'a> {
-    /// [column][row]: u.
-    pub internal: &'a mut [f64],
-    /// 1 - 1/tau.
-    pub decay: &'a [f64],
-    /// Rows of a column.
-    pub rows: usize,
-}
-
-impl<S: Simd> Finish<S> for Advance<'_> {
-    #[inline(always)]
-    fn finish(&mut self, simd: S, column: usize, row: usize, sum: S::f64s) {
-        let (decay, _) = S::as_simd_f64s(&self.decay[row..row + S::F64_LANES]);
-        let (u, _) = S::as_mut_simd_f64s(&mut self.internal[column * self.rows + row..][..S::F64_LANES]);
-        u[0] = simd.mul_add_f64s(decay[0], u[0], sum);
-    }
-}
-
 /// `c <- tanh u` for `columns` columns.
 #[inline(always)]
 pub(crate) fn activate<S: Simd>(simd: S, packed: &Packed, internal: &[f64], states: &mut [f64], columns: usize) {
-    let columns = internal.chunks_exact(packed.rows).zip(states.chunks_exact_mut(packed.state_stride)).take(columns);
-    for (u, state) in columns {
-        let (u, _) = S::as_simd_f64s(u);
-        let (c, _) = S::as_mut_simd_f64s(&mut state[..packed.rows]);
+    for column in 0..columns {
+        let (u, _) = S::as_simd_f64s(&internal[column * packed.rows..][..packed.rows]);
+        let (c, _) = S::as_mut_simd_f64s(&mut states[column * packed.state_stride..][..packed.rows]);
         for (c, u) in c.iter_mut().zip(u) {
+            *c = tanh(simd, *u);
+        }
+    }
+}
+
+/// `u <- (1 - 1/tau) u + drive`, `c <- tanh u` for `columns` columns (2.2), (2.3).
+#[inline(always)]
+pub(crate) fn advance<S: Simd>(
+    simd: S,
+    packed: &Packed,
+    drive: &[f64],
+    internal: &mut [f64],
+    states: &mut [f64],
+    columns: usize,
+) {
+    let (decay, _) = S::as_simd_f64s(&packed.decay);
+    for column in 0..columns {
+        let (drive, _) = S::as_simd_f64s(&drive[column * packed.rows..][..packed.rows]);
+        let (u, _) = S::as_mut_simd_f64s(&mut internal[column * packed.rows..][..packed.rows]);
+        let (c, _) = S::as_mut_simd_f64s(&mut states[column * packed.state_stride..][..packed.rows]);
+        for (((c, u), drive), decay) in c.iter_mut().zip(u).zip(drive).zip(decay) {
+            *u = simd.mul_add_f64s(*decay, *u, *drive);
             *c = tanh(simd, *u);
         }
     }
@@ -163,18 +166,17 @@ pub(crate) fn run<S: Simd>(
         let (now, next) = trajectory.states[at..at + 2 * n * stride].split_at_mut(n * stride);
         let sources = [Columns { values: &now[rows..], stride }, Columns { values: now, stride }];
         let internal = &mut trajectory.internal[..n * rows];
-        let mut advance = Advance { internal, decay: &packed.decay, rows };
         let matrices = [&packed.from_input, &packed.from_context];
-        multiply(simd, Product { matrices, sources, columns: active, start: &packed.bias }, &mut advance);
-        activate(simd, packed, internal, next, active);
+        multiply(simd, Product { matrices, sources, columns: active, start: &packed.bias }, &mut trajectory.drive);
+        advance(simd, packed, &trajectory.drive, internal, next, active);
         if record && k > 0 {
             let out = (k - 1) * n * n_x;
             for column in 0..active {
                 let y = &next[column * stride + n_c..][..n_x];
-                trajectory.mean[out + column * n_x..][..n_x].copy_from_slice(y);
+                copy_few(&mut trajectory.mean[out + column * n_x..][..n_x], y);
                 if variance {
                     let u = &internal[column * rows + n_c + n_x..][..n_x];
-                    trajectory.variance[out + column * n_x..][..n_x].copy_from_slice(u);
+                    copy_few(&mut trajectory.variance[out + column * n_x..][..n_x], u);
                 }
             }
         }

@@ -120,7 +120,7 @@ pub fn generate(
         length(format!("the sensed samples of start {index}"), start.sensed.len(), whole)?;
     }
 
-    let mut packed = Packed::new(topology);
+    let mut packed = Packed::new(topology, engine.instruction_set());
     packed.fill(&network.parameters);
     let mut jobs: Vec<Job<'_>> = starts
         .chunks(COLUMNS)

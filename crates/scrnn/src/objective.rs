@@ -49,6 +49,7 @@ struct Job {
 pub(crate) struct Objective {
     packed: Packed,
     floor: f64,
+    engine: Engine,
     jobs: Vec<Job>,
     idle: Mutex<Vec<Trajectory>>,
     sum: AVec<f64>,
@@ -66,8 +67,8 @@ pub(crate) struct Objective {
 impl Objective {
     /// Takes over the items; `recompute` trades a second forward pass for memory that grows with the square root of
     /// the length.
-    pub fn new(topology: &Topology, items: &[Item<'_>], recompute: bool) -> Self {
-        let packed = Packed::new(topology);
+    pub fn new(topology: &Topology, items: &[Item<'_>], recompute: bool, engine: &Engine) -> Self {
+        let packed = Packed::new(topology, engine.instruction_set());
         let jobs = batch::blocks(topology, items)
             .into_iter()
             .map(|block| Job {
@@ -82,6 +83,7 @@ impl Objective {
         Self {
             floor: topology.variance_floor(),
             jobs,
+            engine: engine.clone(),
             idle: Mutex::new(Vec::new()),
             sum: AVec::new(64),
             gradients: Parameters::zeros(topology),
@@ -99,7 +101,8 @@ impl Objective {
     }
 
     /// Evaluates at `initial`, [item][unit].
-    pub fn evaluate(&mut self, initial: &[f64], want: Want, engine: &Engine) {
+    pub fn evaluate(&mut self, initial: &[f64], want: Want) {
+        let engine = &self.engine;
         let (packed, floor, idle) = (&self.packed, self.floor, &self.idle);
         engine.for_each(&mut self.jobs, |job| {
             let lock = || idle.lock().unwrap_or_else(PoisonError::into_inner);
@@ -232,37 +235,50 @@ fn score<S: Simd>(
     segment: std::ops::Range<usize>,
     trajectory: &mut Trajectory,
 ) {
-    let (n, n_x) = (job.block.columns(), packed.n_x);
+    let n = job.block.columns();
     let steps = segment.start.max(1) - 1..segment.end - 1;
-    let whole = job.block.active(segment.end - 1) == n;
-    let mut of = |steps: std::ops::Range<usize>, columns: usize| {
-        let from = steps.start * n * n_x;
-        let len = if columns == n { steps.len() * n * n_x } else { columns * n_x };
-        let variance: &mut [f64] =
-            if packed.n_out > n_x { &mut trajectory.variance[from..from + len] } else { &mut [] };
-        let target = from + job.block.delay * n * n_x;
-        Predictions {
-            mean: &mut trajectory.mean[from..from + len],
-            variance,
-            target: &job.block.samples[target..target + len],
-            terms: &mut trajectory.terms,
-            squares: &mut trajectory.squares,
-            precisions: &mut trajectory.precisions,
-        }
-        .score(simd, floor);
-        let rows = trajectory.terms[..len].chunks_exact(n_x).zip(trajectory.squares[..len].chunks_exact(n_x));
-        for ((terms, squares), column) in rows.zip((0..columns).cycle()) {
-            job.ln_likelihood[column] += terms.iter().sum::<f64>();
-            job.squared_error[column] += squares.iter().sum::<f64>();
-        }
-    };
-    if whole {
-        of(steps, n);
+    if job.block.active(segment.end - 1) == n {
+        score_steps(simd, packed, floor, job, steps, n, trajectory);
     } else {
         for step in steps {
             let active = job.block.active(step + 1);
-            if active > 0 {
-                of(step..step + 1, active);
+            score_steps(simd, packed, floor, job, step..step + 1, active, trajectory);
+        }
+    }
+}
+
+/// Scores the first `columns` columns of a range of steps; of several steps, all columns.
+#[inline(always)]
+fn score_steps<S: Simd>(
+    simd: S,
+    packed: &Packed,
+    floor: f64,
+    job: &mut Job,
+    steps: std::ops::Range<usize>,
+    columns: usize,
+    trajectory: &mut Trajectory,
+) {
+    let (n, n_x) = (job.block.columns(), packed.n_x);
+    let from = steps.start * n * n_x;
+    let len = steps.len() * columns * n_x;
+    let target = from + job.block.delay * n * n_x;
+    let variance: &mut [f64] = if packed.n_out > n_x { &mut trajectory.variance[from..from + len] } else { &mut [] };
+    Predictions {
+        mean: &mut trajectory.mean[from..from + len],
+        variance,
+        target: &job.block.samples[target..target + len],
+        terms: &mut trajectory.terms,
+        squares: &mut trajectory.squares,
+        precisions: &mut trajectory.precisions,
+    }
+    .score(simd, floor);
+    let mut at = 0;
+    for _ in steps {
+        for column in 0..columns {
+            for _ in 0..n_x {
+                job.ln_likelihood[column] += trajectory.terms[at];
+                job.squared_error[column] += trajectory.squares[at];
+                at += 1;
             }
         }
     }

@@ -93,9 +93,9 @@ fn check(case: &Case) {
     let (point, samples) = (case.point(), case.samples());
     let topology = &point.network.topology;
     let items: Vec<_> = samples.iter().zip(case.lengths).map(|(x, &steps)| Item { samples: x, steps }).collect();
-    let mut objective = Objective::new(topology, &items, case.recompute);
+    let mut objective = Objective::new(topology, &items, case.recompute, &Engine::serial());
     objective.set_parameters(&point.network.parameters);
-    objective.evaluate(point.states.values(), Want::Everything, &Engine::serial());
+    objective.evaluate(point.states.values(), Want::Everything);
 
     for (s, (x, &steps)) in samples.iter().zip(case.lengths).enumerate() {
         let (plain, squared) = likelihood::plain(&point.network, point.states.sequence(s), x, steps);
@@ -247,10 +247,10 @@ fn more_channels_than_units() {
 fn evaluate(case: &Case, engine: &Engine) -> (Vec<u64>, Vec<u64>) {
     let (point, samples) = (case.point(), case.samples());
     let items: Vec<_> = samples.iter().zip(case.lengths).map(|(x, &steps)| Item { samples: x, steps }).collect();
-    let mut objective = Objective::new(&point.network.topology, &items, case.recompute);
+    let mut objective = Objective::new(&point.network.topology, &items, case.recompute, engine);
     objective.set_parameters(&point.network.parameters);
     for _ in 0..2 {
-        objective.evaluate(point.states.values(), Want::Everything, engine);
+        objective.evaluate(point.states.values(), Want::Everything);
     }
     let bits = |values: &[f64]| values.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
     let states = [objective.initial.as_slice(), &objective.ln_likelihood, &objective.squared_error].concat();
@@ -283,7 +283,7 @@ fn recomputation_keeps_a_small_part_of_the_states() {
     let topology = LONG.point().network.topology;
     let samples = vec![0.0; 2 * 20_001];
     let items = [Item { samples: &samples, steps: 20_000 }];
-    let packed = Packed::new(&topology);
+    let packed = Packed::new(&topology, crate::engine::InstructionSet::best());
     let block = &batch::blocks(&topology, &items)[0];
     let cut = Cut::new(&packed, block, true);
     assert!(cut.spans() > 10 && cut.span * 10 < cut.products, "{cut:?}");

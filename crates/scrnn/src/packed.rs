@@ -12,6 +12,7 @@
 
 use aligned_vec::AVec;
 
+use crate::engine::InstructionSet;
 use crate::kernels::panels::{Panels, chains_for};
 use crate::kernels::{padded, stride};
 use crate::parameters::{Block, Gradients, Parameters};
@@ -57,7 +58,7 @@ fn filled(count: usize, value: f64) -> AVec<f64> {
 }
 
 impl Packed {
-    pub fn new(topology: &Topology) -> Self {
+    pub fn new(topology: &Topology, set: InstructionSet) -> Self {
         let (n_c, n_x, n_out) = (topology.context_units(), topology.channels(), topology.output_units());
         let rows = padded(n_c + n_out);
         let mut decay = filled(rows, 0.0);
@@ -66,7 +67,7 @@ impl Packed {
             decay[i] = 1.0 - 1.0 / tau;
             rate[i] = 1.0 / tau;
         }
-        let chains = chains_for(rows);
+        let panels = |rows, inner| Panels::zeros(rows, inner, chains_for(rows), set);
         Self {
             n_c,
             n_x,
@@ -74,14 +75,14 @@ impl Packed {
             rows,
             state_stride: stride(rows + n_x + 1),
             delta_stride: stride(rows),
-            from_context: Panels::zeros(rows, n_c, chains),
-            from_input: Panels::zeros(rows, n_x, chains),
+            from_context: panels(rows, n_c),
+            from_input: panels(rows, n_x),
             bias: filled(rows, 0.0),
             decay,
             rate,
-            backward: Panels::zeros(n_c, n_c + n_out, chains_for(n_c)),
-            outputs: Panels::zeros(n_out, n_c, chains_for(n_out)),
-            outputs_from_input: Panels::zeros(n_out, n_x, chains_for(n_out)),
+            backward: panels(n_c, n_c + n_out),
+            outputs: panels(n_out, n_c),
+            outputs_from_input: panels(n_out, n_x),
             output_bias: filled(padded(n_out), 0.0),
             zeros: filled(rows, 0.0),
             receives: topology.per_unit(|group| group.receives_input).collect(),

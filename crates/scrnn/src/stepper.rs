@@ -6,7 +6,7 @@
 use aligned_vec::AVec;
 use pulp::Simd;
 
-use crate::forward::{Advance, activate};
+use crate::forward::{activate, advance};
 use crate::kernels::activation::{exp, tanh};
 use crate::kernels::padded;
 use crate::kernels::panels::{Columns, Product, multiply};
@@ -20,6 +20,8 @@ pub(crate) struct Stepper {
     states: AVec<f64>,
     /// [column][rows].
     internal: AVec<f64>,
+    /// [column][rows]: what the product of a step gives.
+    drive: AVec<f64>,
     /// [column][padded outputs]: u of the mean and variance units, and what becomes of them.
     outputs: AVec<f64>,
     mean: AVec<f64>,
@@ -34,6 +36,7 @@ impl Stepper {
             columns,
             states: zeros(columns * packed.state_stride),
             internal: zeros(columns * packed.rows),
+            drive: zeros(columns * packed.rows),
             outputs: zeros(outputs),
             mean: zeros(outputs),
             variance: zeros(outputs),
@@ -79,8 +82,8 @@ impl Stepper {
         let (rows, stride, columns) = (packed.rows, packed.state_stride, self.columns);
         let matrices = [&packed.from_input, &packed.from_context];
         let product = Product { matrices, sources: sources(&self.states, rows, stride), columns, start: &packed.bias };
-        multiply(simd, product, &mut Advance { internal: &mut self.internal, decay: &packed.decay, rows });
-        activate(simd, packed, &self.internal, &mut self.states, columns);
+        multiply(simd, product, &mut self.drive);
+        advance(simd, packed, &self.drive, &mut self.internal, &mut self.states, columns);
 
         let matrices = [&packed.outputs_from_input, &packed.outputs];
         let product = Product {
@@ -89,8 +92,7 @@ impl Stepper {
             columns,
             start: &packed.output_bias,
         };
-        let rows = padded(packed.n_out);
-        multiply(simd, product, &mut Advance { internal: &mut self.outputs, decay: &packed.zeros, rows });
+        multiply(simd, product, &mut self.outputs);
         let (u, _) = S::as_simd_f64s(&self.outputs);
         let (mean, _) = S::as_mut_simd_f64s(&mut self.mean);
         let (variance, _) = S::as_mut_simd_f64s(&mut self.variance);

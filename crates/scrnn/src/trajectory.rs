@@ -57,6 +57,8 @@ pub(crate) struct Trajectory {
     pub states: AVec<f64>,
     /// [column][rows]: the running internal states.
     pub internal: AVec<f64>,
+    /// [column][rows]: what the products of one step give.
+    pub drive: AVec<f64>,
     /// [span][column][rows]: internal states where spans start.
     pub span_starts: AVec<f64>,
     /// [step][column][channel]: y, then d ln L / d u of the mean units.
@@ -77,6 +79,7 @@ impl Trajectory {
         Self {
             states: empty(),
             internal: empty(),
+            drive: empty(),
             span_starts: empty(),
             mean: empty(),
             variance: empty(),
@@ -97,12 +100,14 @@ impl Trajectory {
             }
         };
         let channels = if packed.n_out > packed.n_x { packed.n_x } else { 0 };
-        grow(&mut self.states, (cut.span + 1) * n * packed.state_stride);
+        // One more row than is read, for products that read shifted rows.
+        grow(&mut self.states, ((cut.span + 1) * n + 1) * packed.state_stride);
         grow(&mut self.internal, n * packed.rows);
+        grow(&mut self.drive, n * packed.rows);
         grow(&mut self.span_starts, cut.spans() * n * packed.rows);
         grow(&mut self.mean, block.steps() * n * packed.n_x);
         grow(&mut self.variance, block.steps() * n * channels);
-        grow(&mut self.deltas, (cut.segment + 1) * n * packed.delta_stride);
+        grow(&mut self.deltas, ((cut.segment + 1) * n + 1) * packed.delta_stride);
         for scratch in [&mut self.terms, &mut self.squares, &mut self.precisions] {
             grow(scratch, cut.segment * n * packed.n_x);
         }

@@ -26,6 +26,17 @@ pub const fn stride(count: usize) -> usize {
     (lines | 1) * ROWS
 }
 
+/// Copies a few values; a call of memcpy would cost more than the values.
+#[inline(always)]
+pub fn copy_few(to: &mut [f64], from: &[f64]) {
+    match (to, from) {
+        ([a], [x]) => *a = *x,
+        ([a, b], [x, y]) => (*a, *b) = (*x, *y),
+        ([a, b, c], [x, y, z]) => (*a, *b, *c) = (*x, *y, *z),
+        (to, from) => to.copy_from_slice(from),
+    }
+}
+
 /// How many accumulators a tile may hold: three quarters of the registers, the rest is for operands. Where there are no
 /// vector registers at all, one: then a tile is only code to compile.
 const fn accumulators<S: pulp::Simd>() -> usize {

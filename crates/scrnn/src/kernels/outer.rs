@@ -10,7 +10,7 @@ use pulp::{Simd, WithSimd};
 
 use super::{ROWS, accumulators, is_used, tallest};
 
-/// Rows of values at equal distance.
+/// Rows of values at equal distance. There must be one row more than is read, or as much memory behind the last.
 #[derive(Debug, Clone, Copy)]
 pub struct Rows<'a> {
     /// All rows.
@@ -110,12 +110,12 @@ impl<const M: usize, const N: usize> WithSimd for Tile<'_, M, N> {
                 sums[m][n] = out[m];
             }
         }
-        let deltas = job.delta.values.chunks(job.delta.stride);
-        let states = job.state.values.chunks(job.state.stride);
-        let k = job.from + first;
-        for (delta, state) in deltas.zip(states).take(job.count) {
-            let (delta, _) = S::as_simd_f64s(&delta[job.row..job.row + M * lanes]);
-            let state = &state[k..k + N];
+        let (height, k) = (M * lanes, job.from + first);
+        let deltas = &job.delta.values[job.row..][..job.count * job.delta.stride];
+        let states = &job.state.values[k..][..job.count * job.state.stride];
+        for (delta, state) in deltas.chunks_exact(job.delta.stride).zip(states.chunks_exact(job.state.stride)) {
+            let (delta, _) = S::as_simd_f64s(&delta[..height]);
+            let state = &state[..N];
             for n in 0..N {
                 let x = simd.splat_f64s(state[n]);
                 for m in 0..M {

@@ -4,18 +4,16 @@
 //! out[row, column] = start[row] + sum_p sum_k matrix_p[row, k] * source_p[column, k]
 //! ```
 //!
-//! The matrix is cut into panels of a few vectors of rows; within a panel the values of one k lie side by side, so a
-//! product reads it front to back. A tile of a panel and a few columns keeps all of its sums in registers. Sums run over
+//! The matrix is cut into panels as tall as a tile of the instruction set; within a panel the values of one k lie side
+//! by side, so a product reads it front to back. A tile of a panel and a few columns keeps all of its sums in registers. Sums run over
 //! k in ascending order; few rows are summed in two interleaved chains, because a short sum would otherwise wait for its
 //! own latency. Neither depends on the number of columns.
 
 use aligned_vec::AVec;
 use pulp::{Simd, WithSimd};
 
-use super::{ROWS, accumulators, is_used, padded, tallest};
-
-/// Rows of a panel under the widest instructions: four vectors of eight.
-const PANEL: usize = 4 * ROWS;
+use super::{ROWS, accumulators, is_used, padded};
+use crate::engine::InstructionSet;
 
 /// A matrix in panels, zero-padded to whole vectors of rows.
 #[derive(Debug, Clone)]
@@ -23,14 +21,23 @@ pub struct Panels {
     rows: usize,
     inner: usize,
     chains: usize,
+    /// First row and height of each panel.
+    panels: Vec<(usize, usize)>,
     values: AVec<f64>,
 }
 
-/// The heights in rows of the panels of a matrix of `rows` rows (a multiple of [`ROWS`]): as even as can be.
-fn heights(rows: usize) -> impl Iterator<Item = usize> {
-    let vectors = rows / ROWS;
-    let count = rows.div_ceil(PANEL).max(1);
-    (0..count).map(move |p| (vectors / count + usize::from(p < vectors % count)) * ROWS)
+/// First row and height of the panels of a matrix of `rows` rows (a multiple of [`ROWS`]), at most `tallest` high: as
+/// even as can be.
+fn panels(rows: usize, tallest: usize) -> Vec<(usize, usize)> {
+    let groups = rows / ROWS;
+    let count = rows.div_ceil(tallest).max(1);
+    let mut start = 0;
+    let next = |p: usize| {
+        let height = (groups / count + usize::from(p < groups % count)) * ROWS;
+        start += height;
+        (start - height, height)
+    };
+    (0..count).map(next).collect()
 }
 
 /// Interleaved chains for a matrix of `rows` rows: up to six vectors of rows are too few to hide a sum's latency.
@@ -40,24 +47,27 @@ pub const fn chains_for(rows: usize) -> usize {
 }
 
 impl Panels {
-    /// Room for `rows` x `inner`, all zeros.
+    /// Room for `rows` x `inner`, all zeros, in panels for an instruction set.
     #[must_use]
-    pub fn zeros(rows: usize, inner: usize, chains: usize) -> Self {
+    pub fn zeros(rows: usize, inner: usize, chains: usize, set: InstructionSet) -> Self {
         let rows = padded(rows);
-        Self { rows, inner, chains, values: AVec::from_iter(64, std::iter::repeat_n(0.0, rows * inner)) }
+        let tallest = match set {
+            InstructionSet::Avx512 => 4 * ROWS,
+            InstructionSet::Avx2 | InstructionSet::Neon | InstructionSet::Portable => ROWS,
+        };
+        let values = AVec::from_iter(64, std::iter::repeat_n(0.0, rows * inner));
+        Self { rows, inner, chains, panels: panels(rows, tallest), values }
     }
 
     /// Writes `value(row, k)` everywhere; rows beyond `rows` stay 0.
     pub fn fill(&mut self, rows: usize, value: impl Fn(usize, usize) -> f64) {
-        let mut start = 0;
-        for height in heights(self.rows) {
+        for &(start, height) in &self.panels {
             let panel = &mut self.values[start * self.inner..(start + height) * self.inner];
             for (k, out) in panel.chunks_exact_mut(height).enumerate() {
                 for (r, out) in out.iter_mut().enumerate().take(rows.saturating_sub(start)) {
                     *out = value(start + r, k);
                 }
             }
-            start += height;
         }
     }
 
@@ -83,12 +93,6 @@ pub struct Columns<'a> {
     pub stride: usize,
 }
 
-/// Receives the sums: a vector of rows of one column at a time.
-pub trait Finish<S: Simd> {
-    /// `sum` holds rows `row..row + lanes` of column `column`.
-    fn finish(&mut self, simd: S, column: usize, row: usize, sum: S::f64s);
-}
-
 /// What is multiplied; all matrices have the same rows. `start` holds one value a row.
 #[derive(Clone, Copy)]
 pub struct Product<'a, const P: usize> {
@@ -102,69 +106,51 @@ pub struct Product<'a, const P: usize> {
     pub start: &'a [f64],
 }
 
-/// Multiplies.
+/// Multiplies: `out` holds one row of as many values as the matrices have rows for each column.
 #[inline(always)]
-pub fn multiply<S: Simd, const P: usize>(simd: S, product: Product<'_, P>, finish: &mut impl Finish<S>) {
+pub fn multiply<S: Simd, const P: usize>(simd: S, product: Product<'_, P>, out: &mut [f64]) {
     match product.matrices[0].chains {
-        2 => bands::<S, P, 2>(simd, &product, finish),
-        _ => bands::<S, P, 1>(simd, &product, finish),
+        2 => bands::<S, P, 2>(simd, &product, out),
+        _ => bands::<S, P, 1>(simd, &product, out),
     }
 }
 
-/// Some rows of a panel: those that one tile covers.
-#[derive(Clone, Copy)]
-struct Band {
-    /// First row of the panel.
-    panel_start: usize,
-    /// Rows of the panel.
-    height: usize,
-    /// First row of the band, within the panel.
-    band: usize,
-    /// First row of the band, within the matrix.
-    row: usize,
-}
-
-/// Narrow instruction sets cut a panel into bands of as many vectors as their registers hold.
 #[inline(always)]
-fn bands<S: Simd, const P: usize, const K: usize>(simd: S, product: &Product<'_, P>, finish: &mut impl Finish<S>) {
-    let mut panel_start = 0;
-    for height in heights(product.matrices[0].rows) {
-        let mut band = 0;
-        while band < height {
-            let vectors = ((height - band) / S::F64_LANES).min(tallest::<S>());
-            let job = Band { panel_start, height, band, row: panel_start + band };
-            match vectors {
-                4 => tiles::<S, P, 4, K>(simd, product, job, finish),
-                3 => tiles::<S, P, 3, K>(simd, product, job, finish),
-                2 => tiles::<S, P, 2, K>(simd, product, job, finish),
-                _ => tiles::<S, P, 1, K>(simd, product, job, finish),
-            }
-            band += vectors.max(1) * S::F64_LANES;
+fn bands<S: Simd, const P: usize, const K: usize>(simd: S, product: &Product<'_, P>, out: &mut [f64]) {
+    for &(row, height) in &product.matrices[0].panels {
+        match height / S::F64_LANES {
+            4 => tiles::<S, P, 4, K>(simd, product, row, out),
+            3 => tiles::<S, P, 3, K>(simd, product, row, out),
+            2 => tiles::<S, P, 2, K>(simd, product, row, out),
+            _ => tiles::<S, P, 1, K>(simd, product, row, out),
         }
-        panel_start += height;
     }
 }
 
-/// As few and as even tiles as the registers allow.
+/// The panel that starts at `row`: as few and as even tiles as the registers allow.
 #[inline(always)]
 fn tiles<S: Simd, const P: usize, const M: usize, const K: usize>(
     simd: S,
     product: &Product<'_, P>,
-    band: Band,
-    finish: &mut impl Finish<S>,
+    row: usize,
+    out: &mut [f64],
 ) {
     let widest = (accumulators::<S>() / (M * K)).clamp(1, 6);
-    let tiles = product.columns.div_ceil(widest).max(1);
+    let tiles = product.columns.div_ceil(widest);
     let mut first = 0;
     for tile in 0..tiles {
-        let width = product.columns / tiles + usize::from(tile < product.columns % tiles);
+        // No division where there is one tile: it would take longer than a small tile does.
+        let width = match tiles {
+            1 => product.columns,
+            _ => product.columns / tiles + usize::from(tile < product.columns % tiles),
+        };
         match width {
-            6 => enter::<S, _, P, M, 6, K>(simd, product, band, first, finish),
-            5 => enter::<S, _, P, M, 5, K>(simd, product, band, first, finish),
-            4 => enter::<S, _, P, M, 4, K>(simd, product, band, first, finish),
-            3 => enter::<S, _, P, M, 3, K>(simd, product, band, first, finish),
-            2 => enter::<S, _, P, M, 2, K>(simd, product, band, first, finish),
-            1 => enter::<S, _, P, M, 1, K>(simd, product, band, first, finish),
+            6 => enter::<S, P, M, 6, K>(simd, product, row, first, out),
+            5 => enter::<S, P, M, 5, K>(simd, product, row, first, out),
+            4 => enter::<S, P, M, 4, K>(simd, product, row, first, out),
+            3 => enter::<S, P, M, 3, K>(simd, product, row, first, out),
+            2 => enter::<S, P, M, 2, K>(simd, product, row, first, out),
+            1 => enter::<S, P, M, 1, K>(simd, product, row, first, out),
             _ => {}
         }
         first += width;
@@ -173,75 +159,80 @@ fn tiles<S: Simd, const P: usize, const M: usize, const K: usize>(
 
 /// Each tile is a function of its own: inlined into one, the many shapes would take minutes to compile.
 #[inline(never)]
-fn enter<S: Simd, F: Finish<S>, const P: usize, const M: usize, const N: usize, const K: usize>(
+fn enter<S: Simd, const P: usize, const M: usize, const N: usize, const K: usize>(
     simd: S,
     product: &Product<'_, P>,
-    band: Band,
+    row: usize,
     first: usize,
-    finish: &mut F,
+    out: &mut [f64],
 ) {
     // A single chain is for seven vectors and more, which split into panels of three and four.
-    if is_used::<S>(M, N, K) && (K == 2 || M >= 3 || S::F64_LANES < ROWS || tallest::<S>() == 1) {
-        simd.vectorize(Tile::<S, F, P, M, N, K> { simd, product, band, first, finish });
+    if is_used::<S>(M, N, K) && (K == 2 || M >= 3 || S::F64_LANES < ROWS || S::REGISTER_COUNT < 16) {
+        simd.vectorize(Tile::<P, M, N, K> { product, row, first, out });
     }
 }
 
 /// M vectors of rows by N columns, in K interleaved chains.
-struct Tile<'a, S, F, const P: usize, const M: usize, const N: usize, const K: usize> {
-    simd: S,
+struct Tile<'a, const P: usize, const M: usize, const N: usize, const K: usize> {
     product: &'a Product<'a, P>,
-    band: Band,
+    row: usize,
     first: usize,
-    finish: &'a mut F,
+    out: &'a mut [f64],
 }
 
-impl<S: Simd, F: Finish<S>, const P: usize, const M: usize, const N: usize, const K: usize> WithSimd
-    for Tile<'_, S, F, P, M, N, K>
-{
+impl<const P: usize, const M: usize, const N: usize, const K: usize> WithSimd for Tile<'_, P, M, N, K> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<Same: Simd>(self, _: Same) {
-        let Self { simd, product, band, first, finish } = self;
-        let lanes = S::F64_LANES;
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { product, row, first, out } = self;
+        let height = M * S::F64_LANES;
         let mut sums = [[[simd.splat_f64s(0.0); N]; M]; K];
-        let (starts, _) = S::as_simd_f64s(&product.start[band.row..band.row + M * lanes]);
+        let (starts, _) = S::as_simd_f64s(&product.start[row..row + height]);
         for m in 0..M {
-            sums[0][m] = [starts[m]; N];
+            for n in 0..N {
+                sums[0][m][n] = starts[m];
+            }
         }
         for p in 0..P {
             let inner = product.matrices[p].inner;
-            let panel = &product.matrices[p].values[band.panel_start * inner..(band.panel_start + band.height) * inner];
-            let (panel, _) = S::as_simd_f64s(panel);
-            let (step, offset) = (band.height / lanes, band.band / lanes);
+            let (panel, _) = S::as_simd_f64s(&product.matrices[p].values[row * inner..(row + height) * inner]);
+            let (weights, _) = panel.as_chunks::<M>();
+            let (pairs, rest) = weights.as_chunks::<2>();
             let source = product.sources[p];
-            let column: [&[f64]; N] = std::array::from_fn(|c| &source.values[(first + c) * source.stride..][..inner]);
-            let add = |sums: &mut [[S::f64s; N]; M], weights: &[S::f64s], k: usize| {
-                let weights = &weights[offset..offset + M];
-                for n in 0..N {
-                    let x = simd.splat_f64s(column[n][k]);
-                    for m in 0..M {
-                        sums[m][n] = simd.mul_add_f64s(weights[m], x, sums[m][n]);
+            let mut column = [[].as_slice(); N];
+            for n in 0..N {
+                column[n] = &source.values[(first + n) * source.stride..][..inner];
+            }
+            let mut paired = [[].as_slice(); N];
+            for n in 0..N {
+                paired[n] = &column[n].as_chunks::<2>().0[..pairs.len()];
+            }
+            for k in 0..pairs.len() {
+                for half in 0..2 {
+                    for n in 0..N {
+                        let x = simd.splat_f64s(paired[n][k][half]);
+                        for m in 0..M {
+                            let sum = &mut sums[half % K][m][n];
+                            *sum = simd.mul_add_f64s(pairs[k][half][m], x, *sum);
+                        }
                     }
                 }
-            };
-            let mut k = 0;
-            let groups = panel.chunks_exact(step * K);
-            let rest = groups.remainder();
-            for group in groups {
-                for chain in 0..K {
-                    add(&mut sums[chain], &group[chain * step..], k + chain);
-                }
-                k += K;
             }
-            if K == 2 && !rest.is_empty() {
-                add(&mut sums[0], rest, k);
+            if let [last] = rest {
+                for n in 0..N {
+                    let x = simd.splat_f64s(column[n][inner - 1]);
+                    for m in 0..M {
+                        sums[0][m][n] = simd.mul_add_f64s(last[m], x, sums[0][m][n]);
+                    }
+                }
             }
         }
-        for m in 0..M {
-            for n in 0..N {
-                let sum = if K == 2 { simd.add_f64s(sums[0][m][n], sums[K - 1][m][n]) } else { sums[0][m][n] };
-                finish.finish(simd, first + n, band.row + m * lanes, sum);
+        let rows = product.matrices[0].rows;
+        for n in 0..N {
+            let (out, _) = S::as_mut_simd_f64s(&mut out[(first + n) * rows + row..][..height]);
+            for m in 0..M {
+                out[m] = if K == 2 { simd.add_f64s(sums[0][m][n], sums[K - 1][m][n]) } else { sums[0][m][n] };
             }
         }
     }

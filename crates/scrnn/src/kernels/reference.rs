@@ -29,7 +29,7 @@ pub fn accumulate(delta: &[f64], rows: usize, state: &[f64], inner: usize) -> Ve
 #[cfg(test)]
 mod tests {
     use super::super::outer::{self, Rows};
-    use super::super::panels::{self, Columns, Finish, Panels, Product};
+    use super::super::panels::{self, Columns, Panels, Product};
     use super::super::{padded, stride};
     use crate::engine::{InstructionSet, Run};
     use proptest::prelude::*;
@@ -43,27 +43,14 @@ mod tests {
         out: &'a mut [f64],
     }
 
-    struct Store<'a> {
-        out: &'a mut [f64],
-        rows: usize,
-    }
-
-    impl<S: Simd> Finish<S> for Store<'_> {
-        #[inline(always)]
-        fn finish(&mut self, _: S, column: usize, row: usize, sum: S::f64s) {
-            S::as_mut_simd_f64s(&mut self.out[column * self.rows + row..][..S::F64_LANES]).0[0] = sum;
-        }
-    }
-
     impl WithSimd for Multiply<'_> {
         type Output = ();
 
         #[inline(always)]
         fn with_simd<S: Simd>(self, simd: S) {
-            let mut store = Store { out: self.out, rows: self.matrix.rows() };
             let (matrices, sources) = ([self.matrix], [self.source]);
             let product = Product { matrices, sources, columns: self.columns, start: self.start };
-            panels::multiply(simd, product, &mut store);
+            panels::multiply(simd, product, self.out);
         }
     }
 
@@ -97,7 +84,7 @@ mod tests {
         chains: usize,
     ) -> (Vec<f64>, Vec<f64>) {
         let (matrix, source, start) = (values(rows * inner, 1), values(columns * inner, 2), values(rows, 3));
-        let mut packed = Panels::zeros(rows, inner, chains);
+        let mut packed = Panels::zeros(rows, inner, chains, set);
         packed.fill(rows, |row, k| matrix[row * inner + k]);
         let mut padded_start = start.clone();
         padded_start.resize(padded(rows), 0.0);
@@ -128,13 +115,13 @@ mod tests {
         #[test]
         fn gradients_agree_with_plain_loops(rows in 1usize..150, inner in 1usize..40, count in 0usize..50) {
             let (rows_padded, ds, zs) = (padded(rows), stride(rows), stride(inner));
-            let mut delta = values(count * ds, 5);
+            let mut delta = values((count + 1) * ds, 5);
             for row in delta.chunks_exact_mut(ds) {
                 row[rows..].fill(0.0);
             }
-            let state = values(count * zs, 6);
-            let plain_delta: Vec<f64> = delta.chunks_exact(ds).flat_map(|d| d[..rows].to_vec()).collect();
-            let plain_state: Vec<f64> = state.chunks_exact(zs).flat_map(|z| z[..inner].to_vec()).collect();
+            let state = values((count + 1) * zs, 6);
+            let plain_delta: Vec<f64> = delta.chunks_exact(ds).take(count).flat_map(|d| d[..rows].to_vec()).collect();
+            let plain_state: Vec<f64> = state.chunks_exact(zs).take(count).flat_map(|z| z[..inner].to_vec()).collect();
             let plain = super::accumulate(&plain_delta, rows, &plain_state, inner);
             for set in InstructionSet::available() {
                 let mut out = vec![0.0; inner * rows_padded];

@@ -118,7 +118,6 @@ pub struct Learner {
     data: Dataset,
     terms: f64,
     objective: Objective,
-    engine: Engine,
     /// Whether the objective already holds the values of the present state.
     evaluated: bool,
 }
@@ -160,19 +159,10 @@ impl Learner {
                 Rule::Adam(AdamRule::new(options, topology, &initial_states, total, variance, plan.epochs))
             }
         };
-        let objective = Objective::new(topology, &items, plan.recompute);
+        let objective = Objective::new(topology, &items, plan.recompute, engine);
         let terms = (total * topology.channels()) as f64;
         let state = State { network, initial_states, rule, epoch: 0 };
-        Ok(Self {
-            last_good: state.clone(),
-            state,
-            plan,
-            data: data.clone(),
-            terms,
-            objective,
-            engine: engine.clone(),
-            evaluated: false,
-        })
+        Ok(Self { last_good: state.clone(), state, plan, data: data.clone(), terms, objective, evaluated: false })
     }
 
     /// Goes on from a checkpoint, of which `new` got the network and the initial states.
@@ -248,7 +238,7 @@ impl Learner {
     fn evaluate(&mut self) {
         if !self.evaluated {
             self.objective.set_parameters(&self.state.network.parameters);
-            self.objective.evaluate(self.state.initial_states.values(), Want::Everything, &self.engine);
+            self.objective.evaluate(self.state.initial_states.values(), Want::Everything);
             self.evaluated = true;
         }
     }

@@ -48,7 +48,7 @@ fn bits(learner: &Learner) -> Vec<u64> {
 #[test]
 fn every_optimiser_ascends() {
     let adaptive = Momentum { adaptive: Some(AdaptiveRate::default()), ..Momentum::default() };
-    for plan in [momentum(3000, Momentum { rate: 1e-3, ..Momentum::default() }), momentum(800, adaptive), adam(800)] {
+    for plan in [momentum(4000, Momentum::default()), momentum(800, adaptive), adam(800)] {
         let mut learner = learner(plan.clone(), 1);
         let (outcome, history) = run(&mut learner);
         assert_eq!((outcome, history.len() as u64), (Outcome::Finished, plan.epochs + 1));
