@@ -1,0 +1,281 @@
+//! `scrnn recognize`: which initial state makes the network predict a sequence best (thesis 2.9)?
+
+use std::path::PathBuf;
+
+use clap::Args;
+use scrnn::dataset::{Dataset, Sequence};
+use scrnn::engine::Engine;
+use scrnn::evaluation::half_mean_squared_error;
+use scrnn::generation::{Feedback, Generated, GenerationOptions, Start, generate};
+use scrnn::recognition::{Recognition, RecognitionOptions, recognize};
+use serde::Serialize;
+
+use crate::args::Shared;
+use crate::command::generate::unit_names;
+use crate::failure::{Ending, Failure, Result};
+use crate::files::{self, Field};
+use crate::output;
+use crate::table::Table;
+use crate::trained::Trained;
+
+/// How many of the learned sequences the table names.
+const NAMED: usize = 3;
+
+/// Find the initial states from which a trained network predicts given sequences best
+///
+/// The weights stay as they are; each sequence's initial state climbs the likelihood from many starts: zero, the mean, the
+/// learned states, and random ones around the mean. The table shows, for each sequence, the start that ended best, its
+/// log-likelihood (nats per step and channel, in scaled units), its error (3.5) in the data's units, and the learned
+/// sequences from whose own initial states the data are most likely.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  scrnn recognize runs/lissajous new.csv
+  scrnn recognize runs/lissajous new.csv --starts 40 --out states.npz
+  scrnn recognize runs/lissajous new.csv --observed 100 --completed whole.csv
+  scrnn generate runs/lissajous --initial-state states.npz")]
+pub struct Arguments {
+    /// A run folder or a checkpoint file
+    run: PathBuf,
+    /// The sequences to recognise: .csv, .txt, .npy or .npz
+    data: PathBuf,
+    /// Number of starts for each sequence
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
+    starts: u32,
+    /// Number of updates from each start
+    #[arg(long, value_name = "N", default_value_t = 300)]
+    epochs: u64,
+    /// Recognise from the first N samples, and complete the rest
+    #[arg(long, value_name = "N")]
+    observed: Option<usize>,
+    /// Rate of the ascent [default: one that suits most networks]
+    #[arg(long, value_name = "RATE")]
+    rate: Option<f64>,
+    /// Seed of the random starts
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Use the run's best network instead of its newest
+    #[arg(long)]
+    best: bool,
+    /// Write the best initial states, for `scrnn generate --initial-state`
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// With --observed: write the sequences with their rest as predicted
+    #[arg(long, value_name = "FILE", requires = "observed")]
+    completed: Option<PathBuf>,
+    /// Print a JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// What was found for one sequence.
+#[derive(Debug, Serialize)]
+struct Found {
+    /// Its name.
+    sequence: String,
+    /// The kind of start that ended best.
+    start: String,
+    /// Nats per step and channel, in scaled units; none without variance units.
+    ln_likelihood: Option<f64>,
+    /// (3.5), in the data's units.
+    error: f64,
+    /// With --observed: (3.5) over the samples that were not observed.
+    completion_error: Option<f64>,
+    /// The best initial state.
+    initial_state: Vec<f64>,
+    /// The learned sequences, most likely first.
+    learned: Vec<Learned>,
+    /// All starts, best first.
+    trials: Vec<Tried>,
+}
+
+/// How likely a learned sequence's initial state makes the data.
+#[derive(Debug, Serialize)]
+struct Learned {
+    /// Its number, from 1.
+    number: usize,
+    sequence: String,
+    ln_likelihood: Option<f64>,
+}
+
+/// Where one start ended.
+#[derive(Debug, Serialize)]
+struct Tried {
+    start: String,
+    ln_likelihood: Option<f64>,
+}
+
+/// Recognises.
+pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
+    let trained = Trained::open(&arguments.run, arguments.best)?;
+    let checkpoint = &trained.checkpoint;
+    let data = files::read(&arguments.data)?;
+    trained.check_channels(&data, &arguments.data)?;
+    data.check_for(&checkpoint.topology)?;
+    let delay = checkpoint.topology.delay();
+    if let Some(observed) = arguments.observed.filter(|observed| *observed <= delay) {
+        let message = format!("--observed {observed} leaves nothing to predict: the network's delay is {delay}");
+        return Err(Failure::input(message, format!("observe at least {} samples", delay + 1)));
+    }
+    let scaled = checkpoint.scaling.apply(&data);
+    let engine = shared.engine()?;
+    let recognitions =
+        recognize(&trained.network(), &checkpoint.initial_states, &scaled, &options(arguments, &trained), &engine)?;
+    let heard = arguments.observed.unwrap_or(usize::MAX);
+    let generated = replay(&trained, &scaled, &recognitions, heard, &engine)?;
+    let found = (0..recognitions.len())
+        .map(|s| summary(&trained, &data.sequences()[s], &recognitions[s], &generated[s], heard))
+        .collect::<Vec<_>>();
+
+    if let Some(path) = &arguments.out {
+        let states = states(&trained, &data, &recognitions)?;
+        files::write(path, &[Field { name: "", data: &states }])?;
+    }
+    if let Some(path) = &arguments.completed {
+        let whole = completed(&trained, &data, &generated, heard)?;
+        files::write(path, &[Field { name: "", data: &whole }])?;
+    }
+    if arguments.json {
+        output::print_json_line(&serde_json::json!({ "sequences": found }))?;
+    } else {
+        output::print(&table(&found, arguments.observed.is_some()))?;
+    }
+    Ok(Ending::Done)
+}
+
+fn options(arguments: &Arguments, trained: &Trained) -> RecognitionOptions {
+    let mut options = RecognitionOptions {
+        starts: arguments.starts as usize,
+        epochs: arguments.epochs,
+        seed: arguments.seed,
+        observed: arguments.observed,
+        ..RecognitionOptions::default()
+    };
+    if let Some(rate) = arguments.rate {
+        options.rate = rate;
+    }
+    let variance = |notes: &crate::notes::Notes| notes.experiment["network"]["initial_state_variance"].as_f64();
+    if let Some(variance) = trained.notes.as_ref().and_then(variance) {
+        options.initial_state_variance = variance;
+    }
+    options
+}
+
+/// Runs each sequence from its best initial state: fed with what was heard, then with its own predictions.
+fn replay(
+    trained: &Trained,
+    scaled: &Dataset,
+    recognitions: &[Recognition],
+    heard: usize,
+    engine: &Engine,
+) -> Result<Vec<Generated>> {
+    let n = scaled.channels().len();
+    let starts: Vec<Start<'_>> = recognitions
+        .iter()
+        .zip(scaled.sequences())
+        .map(|(recognition, sequence)| Start {
+            initial_state: &recognition.trials[0].initial_state,
+            sensed: &sequence.values()[..heard.min(sequence.len()) * n],
+        })
+        .collect();
+    let longest = scaled.sequences().iter().map(Sequence::len).max().unwrap_or(0);
+    let steps = longest - trained.checkpoint.topology.delay();
+    let options = GenerationOptions { steps, feedback: Feedback::mixed(n, 1.0, false), seed: 0, contexts: false };
+    Ok(generate(&trained.network(), &starts, &options, engine)?)
+}
+
+fn summary(
+    trained: &Trained,
+    sequence: &Sequence,
+    recognition: &Recognition,
+    generated: &Generated,
+    heard: usize,
+) -> Found {
+    let checkpoint = &trained.checkpoint;
+    let (n, delay) = (checkpoint.channels.len(), checkpoint.topology.delay());
+    let heard = heard.min(sequence.len());
+    let per_value =
+        |ln_likelihood: f64| checkpoint.topology.has_variance().then(|| ln_likelihood / ((heard - delay) * n) as f64);
+    let means = raw_means(trained, generated);
+    let error = |samples: std::ops::Range<usize>| {
+        let predicted = &means[(samples.start - delay) * n..(samples.end - delay) * n];
+        half_mean_squared_error(&sequence.values()[samples.start * n..samples.end * n], predicted)
+    };
+    let best = &recognition.trials[0];
+    Found {
+        sequence: sequence.name.clone(),
+        start: best.start.to_string(),
+        ln_likelihood: per_value(best.ln_likelihood),
+        error: error(delay..heard),
+        completion_error: (heard < sequence.len()).then(|| error(heard..sequence.len())),
+        initial_state: best.initial_state.clone(),
+        learned: recognition
+            .ranking
+            .iter()
+            .map(|ranked| Learned {
+                number: ranked.sequence + 1,
+                sequence: checkpoint.sequences[ranked.sequence].clone(),
+                ln_likelihood: per_value(ranked.ln_likelihood),
+            })
+            .collect(),
+        trials: recognition
+            .trials
+            .iter()
+            .map(|trial| Tried { start: trial.start.to_string(), ln_likelihood: per_value(trial.ln_likelihood) })
+            .collect(),
+    }
+}
+
+/// One row for each sequence, one column for each context unit.
+fn states(trained: &Trained, data: &Dataset, recognitions: &[Recognition]) -> Result<Dataset> {
+    let topology = &trained.checkpoint.topology;
+    let units: Vec<String> = topology.groups().iter().flat_map(unit_names).collect();
+    let rows = data.sequences().iter().zip(recognitions).map(|(sequence, recognition)| {
+        Sequence::new(sequence.name.clone(), units.len(), recognition.trials[0].initial_state.clone())
+    });
+    Ok(Dataset::new(units.clone(), rows.collect::<scrnn::error::Result<_>>()?)?)
+}
+
+/// What was heard, followed by what the network makes of it.
+fn completed(trained: &Trained, data: &Dataset, generated: &[Generated], heard: usize) -> Result<Dataset> {
+    let checkpoint = &trained.checkpoint;
+    let (n, delay) = (checkpoint.channels.len(), checkpoint.topology.delay());
+    let rows = data.sequences().iter().zip(generated).map(|(sequence, generated)| {
+        let known = heard.min(sequence.len());
+        let mut values = sequence.values()[..known * n].to_vec();
+        values.extend(&raw_means(trained, generated)[(known - delay) * n..(sequence.len() - delay) * n]);
+        Sequence::new(sequence.name.clone(), n, values)
+    });
+    Ok(Dataset::new(data.channels().to_vec(), rows.collect::<scrnn::error::Result<_>>()?)?)
+}
+
+/// The predicted means in the data's units.
+fn raw_means(trained: &Trained, generated: &Generated) -> Vec<f64> {
+    let scaling = &trained.checkpoint.scaling;
+    generated.mean.iter().enumerate().map(|(k, &mean)| scaling.to_raw(k % scaling.channels(), mean)).collect()
+}
+
+fn table(found: &[Found], completed: bool) -> String {
+    let likelihood = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.4}"));
+    let mut head = vec!["sequence", "start", "ln L", "error"];
+    if completed {
+        head.push("error beyond");
+    }
+    head.push("most likely learned sequences (ln L)");
+    let mut table = Table::new(&head);
+    for Found { sequence, start, ln_likelihood, error, completion_error, learned, .. } in found {
+        let mut row = vec![sequence.clone(), start.clone(), likelihood(*ln_likelihood), format!("{error:.3e}")];
+        if completed {
+            row.push(completion_error.map_or("-".to_owned(), |error| format!("{error:.3e}")));
+        }
+        let named = learned.iter().take(NAMED).map(|one| {
+            let name =
+                if one.sequence == one.number.to_string() { String::new() } else { format!(" {}", one.sequence) };
+            let value = one.ln_likelihood.map_or(String::new(), |value| format!(" ({value:.4})"));
+            format!("{}{name}{value}", one.number)
+        });
+        row.push(named.collect::<Vec<_>>().join(", "));
+        table.row(row);
+    }
+    table.to_string()
+}

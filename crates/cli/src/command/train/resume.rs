@@ -1,0 +1,50 @@
+//! Whether a run may go on: only if it would come to what it would have come to.
+
+use std::path::Path;
+
+use scrnn::checkpoint::Checkpoint;
+
+use crate::experiment::{Difference, Experiment, OptimiserName, differences};
+use crate::failure::{Failure, Result};
+use crate::notes::Notes;
+
+/// Compares what the checkpoint notes with `now`, and returns `now` with the best score so far.
+///
+/// # Errors
+/// [`Failure::Refused`], with all differences.
+pub fn check(checkpoint: &Checkpoint, now: Notes, experiment: &Experiment, path: &Path) -> Result<Notes> {
+    let folder = path.display();
+    let anew = "undo the change, or start anew with --overwrite or in another folder with --out";
+    let Some(then) = Notes::of(checkpoint) else {
+        return Err(Failure::refused(format!("the checkpoint in {folder} was not written by `scrnn train`"), anew));
+    };
+    let mut changes = differences(&then.experiment, &now.experiment);
+    // Samples are compared, not where they lie.
+    changes.retain(|change| change.key != "data.files");
+    let by_momentum = experiment.training.optimiser == OptimiserName::Momentum;
+    let is_epochs = |change: &Difference| change.key == "training.epochs";
+    if by_momentum && experiment.training.epochs >= checkpoint.epoch {
+        // Momentum has no schedule: a longer run begins as a shorter one.
+        changes.retain(|change| !is_epochs(change));
+    }
+    if !changes.is_empty() {
+        let list: Vec<String> = changes.iter().map(|change| format!("  {change}")).collect();
+        let message = format!("the experiment changed since the run in {folder} began:\n{}", list.join("\n"));
+        let help = match changes.iter().any(is_epochs) {
+            true if by_momentum => format!("the run is already at epoch {}", checkpoint.epoch),
+            true => format!("with adam the number of epochs shapes the rate from the first epoch on; {anew}"),
+            false => anew.to_owned(),
+        };
+        return Err(Failure::refused(message, help));
+    }
+    if then.data != now.data {
+        let mut message = format!("the data changed since the run in {folder} began:");
+        if then.data.lengths != now.data.lengths {
+            message += &format!("\n  samples in each sequence: {:?} -> {:?}", then.data.lengths, now.data.lengths);
+        }
+        let short = |digest: &str| digest.chars().take(12).collect::<String>();
+        message += &format!("\n  digest: {} -> {}", short(&then.data.digest), short(&now.data.digest));
+        return Err(Failure::refused(message, anew));
+    }
+    Ok(Notes { best: then.best, ..now })
+}

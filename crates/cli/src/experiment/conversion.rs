@@ -1,0 +1,209 @@
+//! From the file's types to the library's, with every default filled in.
+
+use std::path::{Path, PathBuf};
+
+use scrnn::dataset::Dataset;
+use scrnn::learning::{self, Optimiser, Plan};
+use scrnn::scaling::Scaling;
+use scrnn::tasks::{limit_cycle, lissajous, sinusoid};
+use scrnn::topology::{self, Prediction, Topology};
+
+use super::{
+    Adam, AdaptiveRate, Data, Experiment, Group, Momentum, OptimiserName, PriorStep, ScalingChoice, ScalingConstants,
+    ScalingName, ScalingRanges, TaskName, Training,
+};
+use crate::failure::{Failure, Result};
+
+impl TaskName {
+    /// Number of sequences and of samples in each, as in the thesis.
+    pub fn size(self) -> (usize, usize) {
+        match self {
+            Self::Lissajous => {
+                let lissajous::Options { sequences, steps } = lissajous::Options::default();
+                (sequences, steps)
+            }
+            Self::Sinusoid => {
+                let sinusoid::Options { sequences, steps } = sinusoid::Options::default();
+                (sequences, steps)
+            }
+            Self::LimitCycle => {
+                let limit_cycle::Options { sequences, steps } = limit_cycle::Options::default();
+                (sequences, steps)
+            }
+        }
+    }
+}
+
+impl Experiment {
+    /// The same experiment with every value explicit. `folder` is where its file lies.
+    pub fn resolved(mut self, folder: &Path) -> Result<Self> {
+        self.data.resolve(folder)?;
+        self.training.resolve();
+        let a_thousandth = (self.training.epochs / 1000).max(1);
+        self.output.history_every.get_or_insert(a_thousandth);
+        Ok(self)
+    }
+
+    /// The network's topology on `channels` channels.
+    pub fn topology(&self, channels: usize) -> Result<Topology> {
+        let network = &self.network;
+        let prediction = if network.variance {
+            Prediction::MeanAndVariance { floor: network.variance_floor }
+        } else {
+            Prediction::Mean
+        };
+        let groups = network.groups.iter().map(topology::Group::from).collect();
+        Ok(Topology::new(channels, network.delay, groups, prediction)?)
+    }
+
+    /// How to learn. The experiment is a resolved one.
+    pub fn plan(&self) -> Plan {
+        let training = &self.training;
+        let optimiser = match training.optimiser {
+            OptimiserName::Momentum => {
+                Optimiser::Momentum(training.momentum.as_ref().map(Into::into).unwrap_or_default())
+            }
+            OptimiserName::Adam => Optimiser::Adam(training.adam.as_ref().map(Into::into).unwrap_or_default()),
+        };
+        Plan {
+            epochs: training.epochs,
+            initial_state_variance: self.network.initial_state_variance,
+            optimiser,
+            recompute: training.recompute,
+        }
+    }
+}
+
+impl Data {
+    fn resolve(&mut self, folder: &Path) -> Result<()> {
+        if let Some(task) = self.task {
+            let (sequences, steps) = task.size();
+            self.sequences.get_or_insert(sequences);
+            self.steps.get_or_insert(steps);
+            self.seed.get_or_insert(1);
+        }
+        for file in self.files.iter_mut().flatten() {
+            let path: PathBuf = folder.join(&*file);
+            *file = std::path::absolute(&path).map_err(|error| Failure::disk("find", &path, error))?;
+        }
+        let by_default = if self.task.is_some() { ScalingName::None } else { ScalingName::Fit };
+        self.scaling.get_or_insert(ScalingChoice::Named(by_default));
+        Ok(())
+    }
+
+    /// The scaling that the experiment asks for, fitted to `data` if that is asked for.
+    pub fn scaling_for(&self, data: &Dataset) -> Result<Scaling> {
+        let channels = data.channels().len();
+        let fits = |what: &str, count: usize| {
+            if count == channels {
+                return Ok(());
+            }
+            let message = format!("`data.scaling` has {count} {what}, the data have {channels} channels");
+            Err(Failure::input(message, format!("channels: {}", data.channels().join(", "))))
+        };
+        match &self.scaling {
+            Some(ScalingChoice::Named(ScalingName::Fit)) => Ok(Scaling::fit(data, Scaling::RANGE)),
+            Some(ScalingChoice::Ranges(ScalingRanges { ranges })) => {
+                fits("ranges", ranges.len())?;
+                Ok(Scaling::from_ranges(ranges, Scaling::RANGE))
+            }
+            Some(ScalingChoice::Constants(ScalingConstants { offset, scale })) => {
+                fits("offsets", offset.len())?;
+                Ok(Scaling::new(offset.clone(), scale.clone())?)
+            }
+            Some(ScalingChoice::Named(ScalingName::None)) | None => Ok(Scaling::identity(channels)),
+        }
+    }
+}
+
+impl Training {
+    /// Keeps the table of the optimiser that is used, and fills it in.
+    fn resolve(&mut self) {
+        match self.optimiser {
+            OptimiserName::Momentum => {
+                self.momentum.get_or_insert_default();
+                self.adam = None;
+            }
+            OptimiserName::Adam => {
+                self.adam.get_or_insert_default();
+                self.momentum = None;
+            }
+        }
+    }
+}
+
+impl From<&Group> for topology::Group {
+    fn from(group: &Group) -> Self {
+        Self {
+            name: group.name.clone(),
+            units: group.units,
+            time_constant: group.time_constant,
+            receives_input: group.receives_input,
+            drives_output: group.drives_output,
+            learns_initial_state: group.learns_initial_state,
+        }
+    }
+}
+
+impl From<&Momentum> for learning::Momentum {
+    fn from(options: &Momentum) -> Self {
+        Self {
+            rate: options.rate,
+            momentum: options.momentum,
+            prior: match options.prior {
+                PriorStep::Implicit => learning::PriorStep::Implicit,
+                PriorStep::Thesis => learning::PriorStep::Thesis,
+            },
+            adaptive: options.adaptive_rate.as_ref().map(|adaptive| learning::AdaptiveRate {
+                max_error_ratio: adaptive.max_error_ratio,
+                decrease: adaptive.decrease,
+                increase: adaptive.increase,
+                max_tries: adaptive.max_tries,
+            }),
+        }
+    }
+}
+
+impl Default for Momentum {
+    fn default() -> Self {
+        let learning::Momentum { rate, momentum, prior, .. } = learning::Momentum::default();
+        let prior = match prior {
+            learning::PriorStep::Implicit => PriorStep::Implicit,
+            learning::PriorStep::Thesis => PriorStep::Thesis,
+        };
+        Self { rate, momentum, prior, adaptive_rate: None }
+    }
+}
+
+impl Default for AdaptiveRate {
+    fn default() -> Self {
+        let learning::AdaptiveRate { max_error_ratio, decrease, increase, max_tries } =
+            learning::AdaptiveRate::default();
+        Self { max_error_ratio, decrease, increase, max_tries }
+    }
+}
+
+impl From<&Adam> for learning::Adam {
+    fn from(options: &Adam) -> Self {
+        let &Adam { rate, warm_up, final_rate, clip_norm, initial_state_factor, mean_factor, beta1, beta2, epsilon } =
+            options;
+        Self { rate, warm_up, final_rate, clip_norm, initial_state_factor, mean_factor, beta1, beta2, epsilon }
+    }
+}
+
+impl Default for Adam {
+    fn default() -> Self {
+        let learning::Adam {
+            rate,
+            warm_up,
+            final_rate,
+            clip_norm,
+            initial_state_factor,
+            mean_factor,
+            beta1,
+            beta2,
+            epsilon,
+        } = learning::Adam::default();
+        Self { rate, warm_up, final_rate, clip_norm, initial_state_factor, mean_factor, beta1, beta2, epsilon }
+    }
+}

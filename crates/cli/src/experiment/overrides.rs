@@ -1,0 +1,120 @@
+//! `--set key=value`: a dotted key and a TOML value that replace what the experiment file says.
+
+use std::str::FromStr;
+
+use toml::{Table, Value};
+
+/// One `--set`, or a shorthand for one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Override {
+    /// The key's parts. A group is addressed by its name: `network.groups.fast.units`.
+    pub path: Vec<String>,
+    /// The new value.
+    pub value: Value,
+    /// The option as it was typed, to show in errors.
+    pub typed: String,
+}
+
+impl Override {
+    /// A shorthand option such as `--epochs`.
+    pub fn shorthand(option: &str, key: &str, value: u64) -> Result<Self, String> {
+        let number = i64::try_from(value).map_err(|_| format!("{value} is too large for an experiment"))?;
+        let path = key.split('.').map(str::to_owned).collect();
+        Ok(Self { path, value: Value::Integer(number), typed: format!("{option} {value}") })
+    }
+
+    /// Puts the value in its place.
+    ///
+    /// # Errors
+    /// A sentence, if the key leads through something that has no keys.
+    pub fn apply(&self, table: &mut Table) -> Result<(), String> {
+        let (last, parents) = self.path.split_last().ok_or("the key is empty")?;
+        let mut place = table;
+        for (depth, part) in parents.iter().enumerate() {
+            let so_far = self.path[..=depth].join(".");
+            let next = place.entry(part.as_str()).or_insert_with(|| Value::Table(Table::new()));
+            place = match next {
+                Value::Table(table) => table,
+                Value::Array(groups) => {
+                    return self.apply_to_group(groups, depth + 1);
+                }
+                other => return Err(format!("`{so_far}` is {}, it has no keys", other.type_str())),
+            };
+        }
+        place.insert(last.clone(), self.value.clone());
+        Ok(())
+    }
+
+    /// Goes on below the array `groups`, whose tables are told apart by their names.
+    fn apply_to_group(&self, groups: &mut [Value], depth: usize) -> Result<(), String> {
+        let named = |group: &Value| group.get("name").and_then(Value::as_str).map(str::to_owned);
+        let names: Vec<String> = groups.iter().filter_map(named).collect();
+        let list = || names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+        let array = self.path[..depth].join(".");
+        let wanted = &self.path[depth];
+        let Some(Value::Table(group)) = groups.iter_mut().find(|group| named(group).as_ref() == Some(wanted)) else {
+            return Err(if names.is_empty() {
+                format!("`{array}` is a list, it has no keys")
+            } else {
+                format!("`{array}` has no `{wanted}`; there are {}", list())
+            });
+        };
+        if depth + 1 == self.path.len() {
+            return Err(format!("`{}` needs the key to change, e.g. `.units`", self.path.join(".")));
+        }
+        Self { path: self.path[depth + 1..].to_vec(), ..self.clone() }.apply(group)
+    }
+}
+
+impl FromStr for Override {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (key, value) =
+            text.split_once('=').ok_or_else(|| format!("`{text}` has no `=`; write e.g. training.adam.rate=0.001"))?;
+        let path: Vec<String> = key.trim().split('.').map(|part| part.trim().to_owned()).collect();
+        if path.iter().any(String::is_empty) {
+            return Err(format!("`{key}` is not a key; write e.g. training.adam.rate=0.001"));
+        }
+        let value = value.trim();
+        let value = value.parse::<Value>().unwrap_or_else(|_| Value::String(value.to_owned()));
+        Ok(Self { path, value, typed: format!("--set {text}") })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn applied(text: &str) -> Result<Table, String> {
+        let file = "[training]\nepochs = 10\n[[network.groups]]\nname = \"fast\"\nunits = 3\n";
+        let mut table: Table = toml::from_str(file).unwrap();
+        text.parse::<Override>()?.apply(&mut table)?;
+        Ok(table)
+    }
+
+    #[test]
+    fn a_value_replaces_or_adds_a_key() {
+        assert_eq!(applied("training.epochs=7").unwrap()["training"]["epochs"], Value::Integer(7));
+        assert_eq!(applied("training.adam.rate=1e-3").unwrap()["training"]["adam"]["rate"], Value::Float(1e-3));
+    }
+
+    #[test]
+    fn a_value_that_is_not_toml_is_a_string() {
+        assert_eq!(applied("data.task=limit-cycle").unwrap()["data"]["task"], Value::String("limit-cycle".into()));
+    }
+
+    #[test]
+    fn a_group_is_found_by_its_name() {
+        assert_eq!(applied("network.groups.fast.units=9").unwrap()["network"]["groups"][0]["units"], Value::Integer(9));
+        assert!(applied("network.groups.slow.units=9").unwrap_err().contains("there are `fast`"));
+        assert!(applied("network.groups.fast=9").unwrap_err().contains("needs the key"));
+    }
+
+    #[test]
+    fn senseless_keys_are_refused() {
+        assert!(applied("training.epochs.more=7").unwrap_err().contains("has no keys"));
+        assert!(applied("training..epochs=7").is_err());
+        assert!(applied("training").unwrap_err().contains("no `=`"));
+    }
+}

@@ -1,0 +1,175 @@
+//! What ends a command early, and with which exit code.
+//!
+//! | code | meaning |
+//! |---|---|
+//! | 0 | success |
+//! | 2 | bad usage or bad input: arguments, experiment, data |
+//! | 3 | the training diverged; the last good state is saved |
+//! | 4 | a file could not be read or written |
+//! | 5 | refused: the run folder is busy or holds a run, or experiment or data changed |
+//! | 130 | interrupted by Ctrl-C; the state is saved |
+
+use std::io;
+use std::ops::Range;
+use std::path::Path;
+
+use miette::{Diagnostic, NamedSource, SourceSpan};
+
+use crate::files::FileError;
+
+/// How a command ended that did what it could.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ending {
+    /// All was done.
+    Done,
+    /// Training left the finite numbers and was rolled back.
+    Diverged,
+    /// Ctrl-C.
+    Interrupted,
+}
+
+impl Ending {
+    /// The process' exit code.
+    pub fn code(self) -> u8 {
+        match self {
+            Self::Done => 0,
+            Self::Diverged => 3,
+            Self::Interrupted => 130,
+        }
+    }
+}
+
+/// Why a command could not do its work.
+#[derive(Debug, thiserror::Error, Diagnostic)]
+pub enum Failure {
+    /// Arguments, experiment or data are not what is needed.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Input(Box<BadInput>),
+
+    /// A data file is not what is needed, or the operating system refused it.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    File(#[from] FileError),
+
+    /// The operating system refused to read or write.
+    #[error("cannot {action}")]
+    Disk {
+        /// What was tried, with the file's name.
+        action: String,
+        /// What the system said.
+        #[source]
+        source: io::Error,
+        /// What to do.
+        #[help]
+        help: Option<String>,
+    },
+
+    /// The request is clear, but would do harm.
+    #[error("{message}")]
+    Refused {
+        /// What stands against it.
+        message: String,
+        /// What to do.
+        #[help]
+        help: String,
+    },
+}
+
+/// Bad input, with the place in the file where it is known.
+#[derive(Debug, thiserror::Error, Diagnostic)]
+#[error("{message}")]
+pub struct BadInput {
+    message: String,
+    #[help]
+    help: Option<String>,
+    #[source_code]
+    text: Option<NamedSource<String>>,
+    #[label("{label}")]
+    span: Option<SourceSpan>,
+    label: String,
+}
+
+/// Shorthand for results of commands.
+pub type Result<T> = std::result::Result<T, Failure>;
+
+impl Failure {
+    /// The process' exit code.
+    pub fn code(&self) -> u8 {
+        match self {
+            Self::File(FileError::Disk { .. }) | Self::Disk { .. } => 4,
+            Self::Input(_) | Self::File(_) => 2,
+            Self::Refused { .. } => 5,
+        }
+    }
+
+    /// Bad input without a place in a file.
+    pub fn input(message: impl Into<String>, help: impl Into<String>) -> Self {
+        Self::Input(Box::new(BadInput {
+            message: message.into(),
+            help: Some(help.into()).filter(|help| !help.is_empty()),
+            text: None,
+            span: None,
+            label: String::new(),
+        }))
+    }
+
+    /// Bad input at `span` of `text`, which is the file (or argument) called `name`.
+    pub fn input_at(
+        message: impl Into<String>,
+        help: Option<String>,
+        (name, text): (&str, &str),
+        span: Option<Range<usize>>,
+        label: impl Into<String>,
+    ) -> Self {
+        Self::Input(Box::new(BadInput {
+            message: message.into(),
+            help,
+            text: Some(NamedSource::new(name, text.to_owned())),
+            span: span.map(SourceSpan::from),
+            label: label.into(),
+        }))
+    }
+
+    /// The system's refusal to `verb` ("read", "write", ...) `path`.
+    pub fn disk(verb: &str, path: &Path, source: io::Error) -> Self {
+        let help = match source.kind() {
+            io::ErrorKind::NotFound => Some("check the spelling; paths start from the current folder".to_owned()),
+            io::ErrorKind::PermissionDenied => Some("check who owns the file and its folder".to_owned()),
+            io::ErrorKind::StorageFull => Some("make room on the disk and try again".to_owned()),
+            _ => None,
+        };
+        Self::Disk { action: format!("{verb} {}", path.display()), source, help }
+    }
+
+    /// A request that would do harm.
+    pub fn refused(message: impl Into<String>, help: impl Into<String>) -> Self {
+        Self::Refused { message: message.into(), help: help.into() }
+    }
+}
+
+/// The library counts from 0, the program from 1 as the thesis does.
+impl From<scrnn::error::Error> for Failure {
+    fn from(error: scrnn::error::Error) -> Self {
+        use scrnn::error::Error;
+        match error {
+            Error::NotFinite { sequence, step, channel, value } => Self::input(
+                format!("sequence {}, sample {}, channel {channel} is {value}", sequence + 1, step + 1),
+                "every sample must be a finite number; missing samples are not supported",
+            ),
+            Error::SequenceTooShort { sequence, length, delay } => Self::input(
+                format!(
+                    "sequence {} has {length} samples; a delay of {delay} needs at least {}",
+                    sequence + 1,
+                    delay + 1
+                ),
+                "leave the sequence out, or lower `delay` in the experiment's [network]",
+            ),
+            Error::NoSuch { what, found, count } => Self::input(
+                format!("{what} {} does not exist; there are {count}, counted from 1", found + 1),
+                "`scrnn inspect` shows what there is",
+            ),
+            other => Self::input(other.to_string(), ""),
+        }
+    }
+}

@@ -1,0 +1,266 @@
+//! What can be wrong with a data file: where, what was found, what is needed.
+
+use std::io;
+
+use miette::{Diagnostic, NamedSource, SourceSpan};
+
+/// A data file that cannot be read or written.
+#[derive(Debug, thiserror::Error, Diagnostic)]
+pub enum FileError {
+    /// The operating system refused.
+    #[error("cannot {verb} {path}")]
+    Disk {
+        /// What was tried.
+        verb: &'static str,
+        /// The file.
+        path: String,
+        /// What the system said.
+        #[source]
+        source: io::Error,
+    },
+
+    /// The extension does not tell a format.
+    #[error("the name of {path} does not tell what the file holds")]
+    #[diagnostic(help("data files end in .csv, .txt, .dat, .tsv, .npy or .npz"))]
+    Extension {
+        /// The file.
+        path: String,
+    },
+
+    /// A file that was to hold text.
+    #[error("{path} is not plain text: it {found}")]
+    #[diagnostic(help("save the table as CSV in UTF-8"))]
+    NotText {
+        /// The file.
+        path: String,
+        /// What gave it away.
+        found: &'static str,
+    },
+
+    /// No samples.
+    #[error("{path} holds no samples; needed: at least one")]
+    Empty {
+        /// The file.
+        path: String,
+    },
+
+    /// A header that names no channel.
+    #[error("{path} has no column of samples; its header names only {columns}")]
+    #[diagnostic(help("`sequence`, `step`, `time` and an unnamed first column are not samples"))]
+    NoChannel {
+        /// The file.
+        path: String,
+        /// The columns there are.
+        columns: String,
+    },
+
+    /// A line that cannot be read.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Line(Box<LineError>),
+
+    /// An array that cannot be read.
+    #[error("{path}: {problem}")]
+    Array {
+        /// The file, and the member of an archive.
+        path: String,
+        /// What is wrong.
+        problem: ArrayProblem,
+        /// What to do.
+        #[help]
+        help: Option<&'static str>,
+    },
+
+    /// An array with a value that is NaN or infinite.
+    #[error("{path}: sequence {sequence}, step {sample}, channel {channel} is {value}")]
+    #[diagnostic(help("every sample must be a finite number; missing samples are not supported"))]
+    NotFinite {
+        /// The file.
+        path: String,
+        /// Name of the sequence.
+        sequence: String,
+        /// Number of the sample in it, from 1.
+        sample: usize,
+        /// Name of the channel.
+        channel: String,
+        /// The value.
+        value: f64,
+    },
+
+    /// A `.npz` that is no archive, or a damaged one.
+    #[error("{path} cannot be read as a .npz archive")]
+    Archive {
+        /// The file.
+        path: String,
+        /// What is wrong with it.
+        #[source]
+        source: zip::result::ZipError,
+    },
+
+    /// Fields that do not stand side by side.
+    #[error("{path}: the fields `{first}` and `{other}` differ in the lengths of their sequences")]
+    FieldsDiffer {
+        /// The file.
+        path: String,
+        /// The first field.
+        first: String,
+        /// The one that differs.
+        other: String,
+    },
+
+    /// More than one array for a `.npy`.
+    #[error("{path}: a .npy file holds one array, but there are {found} to write")]
+    #[diagnostic(help("write a .npz file, or a .csv"))]
+    SeveralFields {
+        /// The file.
+        path: String,
+        /// How many.
+        found: usize,
+    },
+
+    /// Sequences of different lengths for a `.npy`.
+    #[error("{path}: the sequences have from {shortest} to {longest} samples; a .npy file needs equal lengths")]
+    #[diagnostic(help("write a .npz file, which holds an array for each sequence"))]
+    Ragged {
+        /// The file.
+        path: String,
+        /// Least samples.
+        shortest: usize,
+        /// Most samples.
+        longest: usize,
+    },
+
+    /// Values that make no data set.
+    #[error("{path}")]
+    Data {
+        /// The file.
+        path: String,
+        /// Why.
+        #[source]
+        source: scrnn::error::Error,
+    },
+}
+
+/// A line of a text file that cannot be read, with the text around it.
+#[derive(Debug, thiserror::Error, Diagnostic)]
+#[error("{path}, line {line}: {problem}")]
+pub struct LineError {
+    /// The file.
+    pub path: String,
+    /// Number of the line, from 1.
+    pub line: usize,
+    /// What is wrong.
+    pub problem: LineProblem,
+    /// What to do.
+    #[help]
+    pub help: Option<String>,
+    /// The file, or of a large one the lines around the place.
+    #[source_code]
+    pub text: NamedSource<String>,
+    /// The place in it.
+    #[label("{}", problem.label())]
+    pub span: SourceSpan,
+}
+
+/// What is wrong with a line.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum LineProblem {
+    /// Another number of fields than the lines before.
+    #[error("{found} fields; needed: {needed}, as in line {first}")]
+    FieldCount {
+        /// Fields of this line.
+        found: usize,
+        /// Fields of the first line.
+        needed: usize,
+        /// Number of the first line.
+        first: usize,
+    },
+
+    /// Something else than a number.
+    #[error("`{found}` in column {column} is not a number")]
+    NotANumber {
+        /// What stands there.
+        found: String,
+        /// Name of the channel.
+        column: String,
+    },
+
+    /// NaN, infinity, or nothing at all.
+    #[error("sequence {sequence}, step {sample}, channel {channel} is {found}")]
+    NotFinite {
+        /// Name of the sequence.
+        sequence: String,
+        /// Number of the sample in it, from 1.
+        sample: usize,
+        /// Name of the channel.
+        channel: String,
+        /// What stands there.
+        found: String,
+    },
+}
+
+impl LineProblem {
+    /// The words under the caret.
+    fn label(&self) -> String {
+        match self {
+            Self::FieldCount { found, needed, .. } => format!("{found} instead of {needed} fields"),
+            Self::NotANumber { .. } => "not a number".to_owned(),
+            Self::NotFinite { .. } => "not a finite number".to_owned(),
+        }
+    }
+}
+
+/// What is wrong with a numpy array.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ArrayProblem {
+    /// Other contents.
+    #[error("this is not a numpy array")]
+    NotNumpy,
+
+    /// A format that did not exist when this was written.
+    #[error("version {major}.{minor} of the numpy format; known: 1.0, 2.0, 3.0")]
+    Version {
+        /// The first number.
+        major: u8,
+        /// The second number.
+        minor: u8,
+    },
+
+    /// A header that ends early, or is not numpy's.
+    #[error("the array's header is damaged: {0}")]
+    Header(&'static str),
+
+    /// Elements that are not numbers.
+    #[error("an array of type `{found}`; needed: floats of 4 or 8 bytes, integers or booleans")]
+    Type {
+        /// The type as numpy writes it.
+        found: String,
+    },
+
+    /// Too many axes, or none.
+    #[error("an array of shape {found}; needed: {needed}")]
+    Shape {
+        /// The shape as numpy writes it.
+        found: String,
+        /// What would do.
+        needed: &'static str,
+    },
+
+    /// More or fewer bytes than the shape says.
+    #[error("the array's header promises {promised} bytes, but {held} follow")]
+    Size {
+        /// Bytes that type and shape ask for.
+        promised: String,
+        /// Bytes that are there.
+        held: usize,
+    },
+
+    /// Sequences on different channels.
+    #[error("{found} channels; needed: {needed}, as in the first array")]
+    Channels {
+        /// Channels of this array.
+        found: usize,
+        /// Channels of the first.
+        needed: usize,
+    },
+}

@@ -1,0 +1,112 @@
+//! history.csv of a run folder: how training went, one row every so many epochs.
+//!
+//! Rows wait in memory until the next checkpoint. After a crash the file may thus be ahead of the checkpoint, never
+//! behind it: rows beyond the checkpoint's epoch are cut off, also a last line that was half written.
+
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::Write as _;
+
+use scrnn::learning::EpochReport;
+
+use crate::failure::{Failure, Result};
+use crate::run_folder::{HISTORY, RunFolder};
+
+const HEADER: &str = "epoch,nll,mse,rate_shared,rate_initial,gradient_norm,seconds\n";
+
+/// The history that is being written.
+#[derive(Debug)]
+pub struct History {
+    waiting: String,
+    last_epoch: Option<u64>,
+    seconds_before: f64,
+}
+
+impl History {
+    /// Starts an empty file.
+    pub fn start(run: &RunFolder) -> Result<Self> {
+        run.write(HISTORY, HEADER.as_bytes())?;
+        Ok(Self { waiting: String::new(), last_epoch: None, seconds_before: 0.0 })
+    }
+
+    /// Goes on with the file of a run whose checkpoint stands at `epoch`.
+    pub fn go_on(run: &RunFolder, epoch: u64) -> Result<Self> {
+        let path = run.file(HISTORY);
+        let text = match std::fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
+            Err(error) => return Err(Failure::disk("read", &path, error)),
+        };
+        let (kept, last) = rows_up_to(&text, epoch);
+        run.write(HISTORY, format!("{HEADER}{kept}").as_bytes())?;
+        let (last_epoch, seconds_before) = last.map_or((None, 0.0), |(epoch, seconds)| (Some(epoch), seconds));
+        Ok(Self { waiting: String::new(), last_epoch, seconds_before })
+    }
+
+    /// Seconds that earlier processes spent on the run.
+    pub fn seconds_before(&self) -> f64 {
+        self.seconds_before
+    }
+
+    /// Takes a row; `seconds` count from the start of this process' training.
+    pub fn row(&mut self, report: &EpochReport, seconds: f64) {
+        if self.last_epoch.is_some_and(|last| report.epoch <= last) {
+            return;
+        }
+        self.last_epoch = Some(report.epoch);
+        let nll = report.nll.map_or(String::new(), |nll| format!("{nll:?}"));
+        let EpochReport { epoch, mse, rate_shared, rate_initial, gradient_norm, .. } = report;
+        let seconds = self.seconds_before + seconds;
+        writeln!(self.waiting, "{epoch},{nll},{mse:?},{rate_shared:?},{rate_initial:?},{gradient_norm:?},{seconds:.3}")
+            .expect("a string takes all");
+    }
+
+    /// Appends the waiting rows to the file.
+    pub fn flush(&mut self, run: &RunFolder) -> Result<()> {
+        if self.waiting.is_empty() {
+            return Ok(());
+        }
+        let path = run.file(HISTORY);
+        let append = || -> std::io::Result<()> {
+            let mut file = File::options().append(true).create(true).open(&path)?;
+            file.write_all(self.waiting.as_bytes())?;
+            file.sync_all()
+        };
+        append().map_err(|error| Failure::disk("write", &path, error))?;
+        self.waiting.clear();
+        Ok(())
+    }
+}
+
+/// The whole rows up to `epoch`, and epoch and seconds of the last of them.
+fn rows_up_to(text: &str, epoch: u64) -> (String, Option<(u64, f64)>) {
+    let (mut kept, mut last) = (String::new(), None);
+    for line in text.split_inclusive('\n').skip(1) {
+        let mut fields = line.trim_end().split(',');
+        let row = fields.next().and_then(|field| field.parse::<u64>().ok());
+        let seconds = fields.nth(5).and_then(|field| field.parse::<f64>().ok());
+        match (row, seconds) {
+            (Some(row), Some(seconds)) if row <= epoch && line.ends_with('\n') => {
+                kept.push_str(line);
+                last = Some((row, seconds));
+            }
+            _ => break,
+        }
+    }
+    (kept, last)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_beyond_the_checkpoint_and_half_lines_are_cut_off() {
+        let row = |epoch| format!("{epoch},0.5,0.1,1e-7,1e-4,2.0,{epoch}.250\n");
+        let text = format!("{HEADER}{}{}{}", row(0), row(10), row(20));
+        assert_eq!(rows_up_to(&text, 10), (format!("{}{}", row(0), row(10)), Some((10, 10.25))));
+        let half = &text[..text.len() - 3];
+        assert_eq!(rows_up_to(half, 100).1, Some((10, 10.25)));
+        assert_eq!(rows_up_to("", 100), (String::new(), None));
+    }
+}

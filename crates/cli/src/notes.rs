@@ -1,0 +1,74 @@
+//! What the program keeps in a checkpoint beside the network. No time and no path of the run is among it: the bytes of
+//! a checkpoint must not depend on how often a training was interrupted.
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::experiment::Experiment;
+
+/// The notes of a checkpoint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Notes {
+    /// The resolved experiment without what does not matter to what is learned.
+    pub experiment: Value,
+    /// The sequences that were learned.
+    pub data: DataNotes,
+    /// How well the network of this checkpoint does, once it was evaluated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub score: Option<Score>,
+    /// The best epoch up to this one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub best: Option<Score>,
+}
+
+/// What is known of the sequences.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DataNotes {
+    /// Fingerprint of names, lengths and samples.
+    pub digest: String,
+    /// Samples in each sequence.
+    pub lengths: Vec<usize>,
+}
+
+/// How well the network of an epoch predicts the sequences that it learned.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Score {
+    /// The number of updates made before.
+    pub epoch: u64,
+    /// Nats per step and channel, in scaled units; none without variance units.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nll: Option<f64>,
+    /// Mean squared error per step and channel, in scaled units.
+    pub mse: f64,
+}
+
+impl Score {
+    /// What learning makes small: the nll, or the squared error where there is no variance.
+    pub fn value(self) -> f64 {
+        self.nll.unwrap_or(self.mse)
+    }
+}
+
+impl Notes {
+    /// Reads them from a checkpoint; none if something else than this program wrote it.
+    pub fn of(checkpoint: &scrnn::checkpoint::Checkpoint) -> Option<Self> {
+        serde_json::from_value(checkpoint.notes.clone()).ok()
+    }
+
+    /// As a checkpoint holds them.
+    pub fn to_value(&self) -> Value {
+        serde_json::to_value(self).expect("strings and finite numbers become JSON")
+    }
+}
+
+/// The part of an experiment that decides what is learned: all but `output` and `training.recompute`.
+pub fn learned_part(experiment: &Experiment) -> Value {
+    let mut value = serde_json::to_value(experiment).expect("strings and finite numbers become JSON");
+    if let Some(entries) = value.as_object_mut() {
+        entries.remove("output");
+    }
+    if let Some(entries) = value["training"].as_object_mut() {
+        entries.remove("recompute");
+    }
+    value
+}

@@ -1,0 +1,111 @@
+//! The folder of one training run. Files in it are replaced as a whole or not at all, and one process at a time writes.
+
+use std::fs::{self, File, TryLockError};
+use std::path::{Path, PathBuf};
+
+use crate::failure::{Failure, Result};
+use crate::files::{self, HALF_WRITTEN};
+
+/// The experiment with every value explicit.
+pub const EXPERIMENT: &str = "experiment.toml";
+/// The newest state, from which training goes on.
+pub const CHECKPOINT: &str = "checkpoint.safetensors";
+/// The network with the lowest nll so far.
+pub const BEST: &str = "best.safetensors";
+/// One row every so many epochs.
+pub const HISTORY: &str = "history.csv";
+/// Held while a process trains here.
+const LOCK: &str = "lock";
+
+/// A run folder that this process owns.
+#[derive(Debug)]
+pub struct RunFolder {
+    path: PathBuf,
+    /// The system frees the lock when the process ends, however it ends.
+    _lock: File,
+}
+
+impl RunFolder {
+    /// Makes the folder if need be, takes its lock, and sweeps away what a killed process left half-written.
+    ///
+    /// # Errors
+    /// [`Failure::Refused`] while another process trains there, [`Failure::Disk`].
+    pub fn open(path: &Path) -> Result<Self> {
+        fs::create_dir_all(path).map_err(|error| Failure::disk("make the folder", path, error))?;
+        let lock_path = path.join(LOCK);
+        let lock = File::options().create(true).truncate(false).write(true).open(&lock_path);
+        let lock = lock.map_err(|error| Failure::disk("open", &lock_path, error))?;
+        match lock.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                return Err(Failure::refused(
+                    format!("another process is training in {}", path.display()),
+                    "wait for it or stop it, or choose another folder with --out",
+                ));
+            }
+            Err(TryLockError::Error(error)) => return Err(Failure::disk("lock", &lock_path, error)),
+        }
+        let entries = fs::read_dir(path).map_err(|error| Failure::disk("list", path, error))?;
+        for entry in entries.flatten() {
+            if entry.file_name().to_string_lossy().starts_with(HALF_WRITTEN) {
+                fs::remove_file(entry.path()).map_err(|error| Failure::disk("remove", &entry.path(), error))?;
+            }
+        }
+        Ok(Self { path: path.to_owned(), _lock: lock })
+    }
+
+    /// The folder itself.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Where the file `name` is.
+    pub fn file(&self, name: &str) -> PathBuf {
+        self.path.join(name)
+    }
+
+    /// Replaces the file `name` as a whole.
+    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
+        Ok(files::replace(&self.file(name), bytes)?)
+    }
+
+    /// Removes the file `name` if it is there.
+    pub fn remove(&self, name: &str) -> Result<()> {
+        match fs::remove_file(self.file(name)) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                Err(Failure::disk("remove", &self.file(name), error))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_second_owner_is_refused_until_the_first_is_gone() {
+        let folder = tempfile::tempdir().unwrap();
+        let first = RunFolder::open(folder.path()).unwrap();
+        let failure = RunFolder::open(folder.path()).unwrap_err();
+        assert_eq!(failure.code(), 5);
+        drop(first);
+        RunFolder::open(folder.path()).unwrap();
+    }
+
+    #[test]
+    fn half_written_files_are_swept_away_and_others_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let half = folder.path().join(format!("{HALF_WRITTEN}x"));
+        fs::write(&half, "x").unwrap();
+        fs::write(folder.path().join("notes.txt"), "x").unwrap();
+        let run = RunFolder::open(folder.path()).unwrap();
+        run.write(CHECKPOINT, b"new").unwrap();
+        assert!(!half.exists() && folder.path().join("notes.txt").exists());
+        assert_eq!(fs::read(run.file(CHECKPOINT)).unwrap(), b"new");
+        run.remove(CHECKPOINT).unwrap();
+        run.remove(CHECKPOINT).unwrap();
+        assert!(!run.file(CHECKPOINT).exists());
+    }
+}

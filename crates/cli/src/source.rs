@@ -1,0 +1,122 @@
+//! Where an experiment's sequences come from: a task, which knows the truth, or files.
+
+use scrnn::dataset::Dataset;
+use scrnn::tasks::{Task, limit_cycle, lissajous, sinusoid};
+use sha2::{Digest, Sha256};
+
+use crate::experiment::{Data, TaskName};
+use crate::failure::{Failure, Result};
+use crate::files;
+
+/// Sequences in their own units.
+#[derive(Debug)]
+pub struct Source {
+    /// What is learned.
+    pub data: Dataset,
+    /// The variance of each sample's noise, where it is known.
+    pub truth: Option<Truth>,
+}
+
+/// The true variances of a task.
+#[derive(Debug)]
+pub struct Truth {
+    /// The task.
+    pub task: TaskName,
+    /// The variance of the noise in each sample.
+    pub variances: Dataset,
+}
+
+/// Makes or reads the sequences of a resolved experiment.
+pub fn load(data: &Data) -> Result<Source> {
+    if let Some(task) = data.task {
+        let (sequences, steps) = task.size();
+        let size = (data.sequences.unwrap_or(sequences), data.steps.unwrap_or(steps));
+        let Task { data, variances, .. } = make(task, size, data.seed.unwrap_or(1))?;
+        return Ok(Source { data, truth: Some(Truth { task, variances }) });
+    }
+    let paths = data.files.as_deref().unwrap_or_default();
+    let mut sets = Vec::with_capacity(paths.len());
+    for path in paths {
+        sets.push((path, files::read(path)?));
+    }
+    let data = match sets.as_slice() {
+        [(_, only)] => only.clone(),
+        several => {
+            let (first, channels) = match several.first() {
+                Some((path, set)) => (path.display(), set.channels().to_vec()),
+                None => return Err(Failure::input("the experiment names no file", "add one to `data.files`")),
+            };
+            let mut sequences = Vec::new();
+            for (path, set) in several {
+                if set.channels() != channels {
+                    let message = format!(
+                        "the channels of {} are {}, those of {first} are {}",
+                        path.display(),
+                        set.channels().join(", "),
+                        channels.join(", ")
+                    );
+                    return Err(Failure::input(message, "files that are learned together need the same channels"));
+                }
+                let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+                for sequence in set.sequences() {
+                    let mut sequence = sequence.clone();
+                    sequence.name = format!("{stem}/{}", sequence.name);
+                    sequences.push(sequence);
+                }
+            }
+            Dataset::new(channels, sequences)?
+        }
+    };
+    Ok(Source { data, truth: None })
+}
+
+/// The data of a task: so many sequences of so many samples.
+pub fn make(task: TaskName, (sequences, steps): (usize, usize), seed: u64) -> Result<Task> {
+    Ok(match task {
+        TaskName::Lissajous => lissajous::generate(&lissajous::Options { sequences, steps }, seed)?,
+        TaskName::Sinusoid => sinusoid::generate(&sinusoid::Options { sequences, steps }, seed)?,
+        TaskName::LimitCycle => limit_cycle::generate(&limit_cycle::Options { sequences, steps }, seed)?.task,
+    })
+}
+
+/// A fingerprint of names, lengths and the bits of all samples.
+pub fn digest(data: &Dataset) -> String {
+    let mut hash = Sha256::new();
+    let text = |hash: &mut Sha256, text: &str| {
+        hash.update((text.len() as u64).to_le_bytes());
+        hash.update(text.as_bytes());
+    };
+    hash.update((data.channels().len() as u64).to_le_bytes());
+    data.channels().iter().for_each(|name| text(&mut hash, name));
+    for sequence in data.sequences() {
+        text(&mut hash, &sequence.name);
+        hash.update((sequence.len() as u64).to_le_bytes());
+        for value in sequence.values() {
+            hash.update(value.to_bits().to_le_bytes());
+        }
+    }
+    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scrnn::dataset::Sequence;
+
+    #[test]
+    fn the_digest_sees_each_bit_the_split_and_the_names() {
+        let set = |name: &str, parts: &[&[f64]]| {
+            let sequences = parts.iter().map(|part| Sequence::new(name, 1, part.to_vec()).unwrap()).collect();
+            digest(&Dataset::new(vec!["y".into()], sequences).unwrap())
+        };
+        let one = set("a", &[&[1.0, 2.0, 3.0]]);
+        assert_eq!(one, set("a", &[&[1.0, 2.0, 3.0]]));
+        for other in [
+            set("b", &[&[1.0, 2.0, 3.0]]),
+            set("a", &[&[1.0, 2.0], &[3.0]]),
+            set("a", &[&[1.0, 2.0, 3.0_f64.next_up()]]),
+        ] {
+            assert_ne!(one, other);
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! The program from outside: each command on small data, its errors, its exit codes, and runs that are killed.
+
+#[path = "cli/experiments.rs"]
+mod experiments;
+#[path = "cli/refusals.rs"]
+mod refusals;
+#[path = "cli/resuming.rs"]
+mod resuming;
+#[path = "cli/strangers.rs"]
+mod strangers;
+#[path = "cli/using.rs"]
+mod using;
+
+use std::path::PathBuf;
+use std::process::Output;
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+/// A small sine wave, learned by momentum ascent.
+const SINE: &str = r#"
+name = "sine"
+[data]
+task = "sinusoid"
+steps = 80
+[[network.groups]]
+name = "context"
+units = 6
+time_constant = 2.0
+[training]
+epochs = 120
+optimiser = "momentum"
+[training.momentum]
+rate = 1e-3
+[output]
+checkpoint_every = 10
+"#;
+
+/// The same with Adam, which has a schedule.
+fn sine_with_adam() -> String {
+    SINE.replace("optimiser = \"momentum\"", "optimiser = \"adam\"").replace("[training.momentum]", "[training.adam]")
+}
+
+/// A folder to work in; all paths of a command line are relative to it.
+struct Place(tempfile::TempDir);
+
+impl Place {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    /// A folder with one experiment file, `sine.toml`.
+    fn with(experiment: &str) -> Self {
+        let place = Self::new();
+        place.write("sine.toml", experiment);
+        place
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: impl AsRef<[u8]>) {
+        std::fs::write(self.path(name), text).unwrap();
+    }
+
+    fn read(&self, name: &str) -> Vec<u8> {
+        let path = self.path(name);
+        std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+    }
+
+    fn text(&self, name: &str) -> String {
+        String::from_utf8(self.read(name)).unwrap()
+    }
+
+    fn run(&self, line: &str) -> Output {
+        let mut command = Command::cargo_bin("scrnn").unwrap();
+        command.current_dir(&self.0).args(line.split_whitespace()).output().unwrap()
+    }
+
+    /// Runs a command that should succeed; its stdout.
+    fn ok(&self, line: &str) -> String {
+        let output = self.run(line);
+        let err = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "scrnn {line}\n{err}");
+        String::from_utf8(output.stdout).unwrap()
+    }
+
+    fn json(&self, line: &str) -> Value {
+        serde_json::from_str(&self.ok(line)).unwrap()
+    }
+
+    /// Runs a command that should end with `code`; its stderr as printed, and with line breaks taken out.
+    fn fails(&self, code: i32, line: &str) -> (String, String) {
+        let output = self.run(line);
+        let err = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(code), "scrnn {line}\n{err}");
+        let flat = err.replace('\u{2502}', " ").split_whitespace().collect::<Vec<_>>().join(" ");
+        (err, flat)
+    }
+}
+
+/// The epochs of a history file.
+fn epochs(history: &str) -> Vec<u64> {
+    history.lines().skip(1).map(|row| row.split(',').next().unwrap().parse().unwrap()).collect()
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    match value {
+        Value::Array(entries) => entries.iter().flat_map(numbers).collect(),
+        number => vec![number.as_f64().unwrap()],
+    }
+}
