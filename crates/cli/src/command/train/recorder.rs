@@ -203,7 +203,7 @@ impl Observer for Recorder<'_> {
         self.notes.score = Some(score);
         self.compare(score, learner);
         let last = report.epoch >= self.epochs;
-        if report.epoch.is_multiple_of(self.history_every) {
+        if last || report.epoch.is_multiple_of(self.history_every) {
             self.history.row(report, self.begun.elapsed().as_secs_f64());
         }
         self.progress.epoch(report);
