@@ -1,4 +1,104 @@
 //! Predictive learning with uncertainty in recurrent networks.
+//!
+//! A network sees a sequence sample by sample and predicts, for a sample that is still to come, its mean and its
+//! variance. It learns both by maximising the likelihood of what it has seen; the variance is never shown to it. One
+//! type of network covers the conventional CTRNN and MTRNN, which predict the mean alone, and the stochastic S-CTRNN and
+//! S-MTRNN, which predict both. Equations are numbered as in the thesis that the crate follows; `docs/equations.md` in
+//! the repository lists them with their tests.
+//!
+//! # The model
+//!
+//! ```text
+//! u_t,i <- (1 - 1/tau_i) u_t-1,i + (1/tau_i) (sum_j w_ij x_t,j + sum_j w_ij c_t-1,j + b_i)   context (2.2), (2.27)
+//! c_t    = tanh u_t                                                                          context (2.3)
+//! y_t    = tanh (W_yc c_t + b_y)                                                             mean (2.2), (2.4)
+//! v_t    = exp  (W_vc c_t + b_v)                                                             variance (2.2), (2.5)
+//!
+//! x_t    = y-hat_{t-xi}                   the input is the sample of xi steps ago
+//! ln L   = sum_t,i ln N(y-hat_t,i | y_t,i, v_t,i)                        what learning maximises (2.11)
+//! u_0    ~ N(u, sigma^2_IS)               each sequence starts from an initial state of its own (2.13)
+//! ```
+//!
+//! The initial state u_0 is the network's handle: learned for each sequence, it makes one network generate many of them
+//! (generation), and it is what is searched for when a new sequence is to be explained (recognition).
+//!
+//! # Quick start
+//!
+//! ```
+//! use scrnn::dataset::{Dataset, Sequence};
+//! use scrnn::engine::Engine;
+//! use scrnn::generation::{Feedback, GenerationOptions, Start, generate};
+//! use scrnn::initialization::initialize;
+//! use scrnn::learning::{Adam, Control, EpochReport, Learner, Optimiser, Outcome, Plan};
+//! use scrnn::recognition::{RecognitionOptions, recognize};
+//! use scrnn::topology::Topology;
+//!
+//! # fn main() -> scrnn::error::Result<()> {
+//! // Two waves on one channel, within reach of the mean units, which is -1 to 1.
+//! let wave = |name: &str, period: f64| {
+//!     let sample = |t: i32| 0.7 * (6.2832 * f64::from(t) / period).sin() + 0.04 * f64::from(t * t).sin();
+//!     Sequence::new(name, 1, (0..100).map(sample).collect())
+//! };
+//! let data = Dataset::new(vec!["y".into()], vec![wave("slow", 25.0)?, wave("fast", 10.0)?])?;
+//!
+//! // An S-CTRNN: 12 context units with a time constant of 2 steps.
+//! let topology = Topology::s_ctrnn(1, 12, 2.0)?;
+//! let (network, initial_states) = initialize(&topology, 2, 1);
+//! let plan = Plan {
+//!     epochs: 800,
+//!     initial_state_variance: 10.0,
+//!     optimiser: Optimiser::Adam(Adam { rate: 0.02, ..Adam::default() }),
+//!     ..Plan::default()
+//! };
+//! let engine = Engine::serial();
+//! let mut learner = Learner::new(network, initial_states, &data, plan, &engine)?;
+//! let mut nll = Vec::new();
+//! let outcome = learner.run(&mut |report: &EpochReport, _: &Learner| {
+//!     nll.extend(report.nll);
+//!     Control::Continue
+//! });
+//! assert_eq!(outcome, Outcome::Finished);
+//! assert!(nll[800] < nll[0] - 1.0, "nats per step and channel: {} to {}", nll[0], nll[800]);
+//!
+//! // Closed loop: from the initial state of "fast" and its first sample, fed with its own noisy predictions.
+//! let (network, learned) = (learner.network(), learner.initial_states());
+//! let start = Start { initial_state: learned.sequence(1), sensed: data.sequences()[1].sample(0) };
+//! let options = GenerationOptions { steps: 50, feedback: Feedback::closed(1, true), seed: 1, contexts: false };
+//! let generated = generate(network, &[start], &options, &engine)?;
+//! assert_eq!(generated[0].sample.len(), 50);
+//! assert!(generated[0].variance.iter().all(|v| *v > 0.0));
+//!
+//! // Recognition: which initial state explains a sequence, and which learned sequence is it like?
+//! let unknown = Dataset::new(vec!["y".into()], vec![data.sequences()[1].truncated(40)])?;
+//! let options = RecognitionOptions { starts: 4, epochs: 20, ..RecognitionOptions::default() };
+//! let recognised = recognize(network, learned, &unknown, &options, &engine)?;
+//! assert_eq!(recognised[0].ranking[0].sequence, 1);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Modules in reading order
+//!
+//! | module | what it holds | thesis |
+//! |---|---|---|
+//! | [`topology`], [`parameters`], [`network`] | groups of context units, weights and biases, both together | 2.5, 2.10 |
+//! | [`initial_states`], [`initialization`] | u_0 of each sequence and their mean; random starting values | 2.6.1, 2.7 |
+//! | [`dataset`], [`scaling`], [`tasks`] | sequences, their way into the network's range, the thesis' data | 2.6.1, 4.2, 3 |
+//! | [`kernels`], [`engine`] | products, tanh and exp in SIMD; instruction set and threads | |
+//! | [`forward`], [`likelihood`] | the dynamics and their score, each with a plain reference | 2.5, 2.6 |
+//! | [`learning`] | momentum ascent, its adaptive rate, Adam; the loop with its observer | 2.6.2, D.1 |
+//! | [`generation`], [`recognition`] | open, closed and mixed loop; the search for u_0 | 2.8, 2.9 |
+//! | [`evaluation`], [`checkpoint`] | measures; a trained network as bytes | 3.2.5 |
+//! | [`error`] | what can be wrong with a request | |
+//!
+//! # What holds everywhere
+//!
+//! - The crate opens no file, prints nothing and reads no clock. Randomness enters as a seed.
+//! - The same data, settings and seed give the same bits, whatever the number of threads.
+//! - Samples and predictions are in the network's units; [`scaling`] leads to and from the data's own.
+//! - Sequences, steps, channels and units count from 0.
+//! - A training that leaves the finite numbers is no error but an [`Outcome`](learning::Outcome): it is rolled back to the
+//!   last good epoch and says where it happened.
 
 pub mod checkpoint;
 pub mod dataset;

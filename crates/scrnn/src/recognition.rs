@@ -292,12 +292,14 @@ fn ascend(
         let rate = options.rate * 0.5 * (1.0 + phase.cos());
         let correct = |beta: f64| 1.0 / (1.0 - beta.powf(epoch as f64 + 1.0));
         let (correct_first, correct_second) = (correct(BETA.0), correct(BETA.1));
-        for index in 0..count {
+        for (index, scale) in scales.iter().enumerate() {
             let own = index * n_c..(index + 1) * n_c;
             let ln_likelihood = objective.ln_likelihood[index];
             if !ln_likelihood.is_finite() {
-                // Out of bounds: back to the best, and stay there.
-                states[own.clone()].copy_from_slice(&best.states[own]);
+                // Out of bounds: back to the best, at rest.
+                states[own.clone()].copy_from_slice(&best.states[own.clone()]);
+                first[own.clone()].fill(0.0);
+                second[own].fill(0.0);
                 continue;
             }
             if ln_likelihood > best.ln_likelihood[index] {
@@ -311,7 +313,7 @@ fn ascend(
                     continue;
                 }
                 let pull = (states[at] - mean[i]) / variance;
-                let g = s * (objective.initial[at] - pull) / scales[index];
+                let g = s * (objective.initial[at] - pull) / scale;
                 first[at] = BETA.0 * first[at] + (1.0 - BETA.0) * g;
                 second[at] = BETA.1 * second[at] + (1.0 - BETA.1) * g * g;
                 let step = first[at] * correct_first / ((second[at] * correct_second).sqrt() + 1e-8);

@@ -6,6 +6,8 @@
 //!
 //! n runs over (step, column) in memory order. Tiles of a few vectors of rows and six k stay in registers while n runs.
 
+#![allow(clippy::needless_range_loop, reason = "loops over the constant sides of a tile unroll; indices say which")]
+
 use pulp::{Simd, WithSimd};
 
 use super::{ROWS, accumulators, is_used, tallest};

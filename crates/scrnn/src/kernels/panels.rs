@@ -9,6 +9,8 @@
 //! k in ascending order; few rows are summed in two interleaved chains, because a short sum would otherwise wait for its
 //! own latency. Neither depends on the number of columns.
 
+#![allow(clippy::needless_range_loop, reason = "loops over the constant sides of a tile unroll; indices say which")]
+
 use aligned_vec::AVec;
 use pulp::{Simd, WithSimd};
 
