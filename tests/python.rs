@@ -25,7 +25,8 @@ fn python() -> Option<PathBuf> {
             let message = format!("no Python with numpy, pandas and safetensors: {}: {why}", python.display());
             assert!(std::env::var_os("CI").is_none(), "{message}");
             // Past the test harness, which shows nothing of a test that passes.
-            writeln!(std::io::stderr(), "skipped: {message}; .ci/run makes one").unwrap();
+            let mut terminal = std::io::stderr().lock();
+            writeln!(terminal, "skipped: {message}; .ci/run makes one").unwrap();
             None
         }
     }
