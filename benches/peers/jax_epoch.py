@@ -136,15 +136,12 @@ def main():
     parameters, samples, tau = task.load(given.folder)
     parameters = {name: jnp.asarray(value) for name, value in parameters.items()}
     samples, tau = jnp.asarray(samples), jnp.asarray(tau)
-    found = {}
-    for variant in [given.variant] if given.variant else VARIANTS:
+
+    def evaluate(variant):
         run = epoch(variant, samples, tau)
-        ln_likelihood, gradients = jax.block_until_ready(run(parameters))
-        if given.check:
-            found[variant] = task.difference(given.folder, float(ln_likelihood), gradients)
-        else:
-            found[variant] = task.milliseconds(lambda: jax.block_until_ready(run(parameters)), given.seconds)
-    task.report(version=jax.__version__, found=found)
+        return lambda: jax.block_until_ready(run(parameters))
+
+    task.run(given, VARIANTS, jax.__version__, evaluate)
 
 
 main()

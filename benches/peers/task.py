@@ -32,7 +32,6 @@ def arguments(description):
     parser.add_argument("--threads", type=int, default=0, help="1 keeps the process to one core; 0 takes all")
     parser.add_argument("--seconds", type=float, default=2.0, help="how long to measure each variant")
     parser.add_argument("--variant", help="measure this variant only, instead of all")
-    parser.add_argument("--check", action="store_true", help="compare with scrnn instead of measuring")
     given = parser.parse_args()
     if given.threads == 1:
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
@@ -49,7 +48,7 @@ def load(folder):
 
 
 def difference(folder, ln_likelihood, gradients):
-    """The largest difference from scrnn's ln L and gradient, relative to ln L and to the largest value of each block."""
+    """How far ln L and the blocks of the gradient are from scrnn's: the largest, relative to the block's largest value."""
     tensors = load_file(folder / "after" / "checkpoint.safetensors")
     before = load_file(folder / "before" / "checkpoint.safetensors")
     flat, at = tensors["optimiser.velocity.shared"], 0
@@ -61,10 +60,10 @@ def difference(folder, ln_likelihood, gradients):
         nll = float(list(csv.DictReader(file))[-1]["nll"])
     with np.load(folder / "lissajous.npz") as archive:
         terms = sum(archive[name][1:].size for name in archive.files)
-    found = {"ln_likelihood": abs(-ln_likelihood / terms / nll - 1.0)}
+    worst = abs(-ln_likelihood / terms / nll - 1.0)
     for name, value in ours.items():
-        found[name] = float(np.abs(np.asarray(gradients[name]) - value).max() / np.abs(value).max())
-    return found
+        worst = max(worst, float(np.abs(np.asarray(gradients[name]) - value).max() / np.abs(value).max()))
+    return worst
 
 
 def milliseconds(epoch, seconds):
@@ -78,5 +77,12 @@ def milliseconds(epoch, seconds):
     return 1e3 * float(np.median(times))
 
 
-def report(**found):
-    print(json.dumps(found))
+def run(given, variants, version, evaluate):
+    """Checks and times variants, and prints what was found. `evaluate` takes a variant and gives a function of nothing
+    that gives ln L and the gradient, the latter as arrays by the names of the blocks."""
+    found = {}
+    for variant in [given.variant] if given.variant else variants:
+        epoch = evaluate(variant)
+        worst = difference(given.folder, *epoch())
+        found[variant] = {"milliseconds": milliseconds(epoch, given.seconds), "difference": worst}
+    print(json.dumps({"version": version, "found": found}))

@@ -15,8 +15,7 @@ VARIANTS = ["eager", "compiled"]
 
 
 def step(u, drive, weights, decay):
-    u = decay * u + drive + torch.tanh(u) @ weights
-    return u
+    return decay * u + drive + torch.tanh(u) @ weights
 
 
 def epoch(variant, parameters, samples, tau):
@@ -40,7 +39,7 @@ def epoch(variant, parameters, samples, tau):
         terms = math.log(2 * math.pi) + u_v + (samples[1:] - mean) ** 2 * torch.exp(-u_v)
         ln_likelihood = -0.5 * terms.sum()
         ln_likelihood.backward()
-        return ln_likelihood
+        return ln_likelihood.item(), {name: value.grad for name, value in p.items()}
 
     return run
 
@@ -51,16 +50,7 @@ def main():
     arrays, samples, tau = task.load(given.folder)
     parameters = {name: torch.tensor(value, requires_grad=True) for name, value in arrays.items()}
     samples, tau = torch.tensor(samples), torch.tensor(tau)
-    found = {}
-    for variant in [given.variant] if given.variant else VARIANTS:
-        run = epoch(variant, parameters, samples, tau)
-        ln_likelihood = run().item()
-        if given.check:
-            gradients = {name: value.grad.numpy() for name, value in parameters.items()}
-            found[variant] = task.difference(given.folder, ln_likelihood, gradients)
-        else:
-            found[variant] = task.milliseconds(run, given.seconds)
-    task.report(version=torch.__version__, found=found)
+    task.run(given, VARIANTS, torch.__version__, lambda variant: epoch(variant, parameters, samples, tau))
 
 
 main()

@@ -77,13 +77,13 @@ pub struct GenerationOptions {
 /// One generated sequence, in the network's units; row k is the prediction of sample k + xi.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Generated {
-    /// y, [steps, N_O].
+    /// y, `[steps, N_O]`.
     pub mean: Vec<f64>,
-    /// v, [steps, N_O]; empty without variance units.
+    /// v, `[steps, N_O]`; empty without variance units.
     pub variance: Vec<f64>,
-    /// y plus noise where the channel asks for it, [steps, N_O].
+    /// y plus noise where the channel asks for it, `[steps, N_O]`.
     pub sample: Vec<f64>,
-    /// c, [steps, N_C]; empty unless asked for.
+    /// c, `[steps, N_C]`; empty unless asked for.
     pub contexts: Vec<f64>,
 }
 

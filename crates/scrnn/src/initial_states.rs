@@ -41,7 +41,7 @@ impl InitialStates {
         &mut self.values[s * self.units..(s + 1) * self.units]
     }
 
-    /// u_0 of all sequences, row-major [S, N_C].
+    /// u_0 of all sequences, row-major `[S, N_C]`.
     #[must_use]
     pub fn values(&self) -> &[f64] {
         &self.values

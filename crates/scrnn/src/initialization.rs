@@ -1,7 +1,7 @@
 //! Random starting values (thesis 2.7).
 //!
-//! Weights from the input are uniform in [-1/N_I, 1/N_I], all other weights in [-1/N_C, 1/N_C], biases in [-1, 1]; every
-//! initial state starts from 0 and the mean of a learned one from a uniform value in [-1/N_C, 1/N_C].
+//! Weights from the input are uniform in `[-1/N_I, 1/N_I]`, all other weights in `[-1/N_C, 1/N_C]`, biases in [-1, 1]; every
+//! initial state starts from 0 and the mean of a learned one from a uniform value in `[-1/N_C, 1/N_C]`.
 
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};

@@ -11,19 +11,19 @@ use crate::topology::Topology;
 /// A block of shared parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Block {
-    /// `w_cx`, [N_C, N_I].
+    /// `w_cx`, `[N_C, N_I]`.
     ContextFromInput,
-    /// `w_cc`, [N_C, N_C].
+    /// `w_cc`, `[N_C, N_C]`.
     ContextFromContext,
-    /// `b_c`, [N_C].
+    /// `b_c`, `[N_C]`.
     ContextBias,
-    /// `w_yc`, [N_O, N_C].
+    /// `w_yc`, `[N_O, N_C]`.
     MeanFromContext,
-    /// `b_y`, [N_O].
+    /// `b_y`, `[N_O]`.
     MeanBias,
-    /// `w_vc`, [N_O, N_C]; empty without variance units.
+    /// `w_vc`, `[N_O, N_C]`; empty without variance units.
     VarianceFromContext,
-    /// `b_v`, [N_O]; empty without variance units.
+    /// `b_v`, `[N_O]`; empty without variance units.
     VarianceBias,
 }
 
