@@ -20,10 +20,12 @@ use std::time::Duration;
 use arguments::Arguments;
 use cache::read_gbytes;
 use machine::{median, peak_gflops, seconds_per_call};
+use scrnn::dataset::Dataset;
 use scrnn::engine::InstructionSet;
 use scrnn::initialization::initialize;
 use scrnn::kernels::padded;
 use scrnn::learning::{Control, EpochReport, Learner};
+use scrnn::tasks::lissajous;
 use scrnn::topology::Topology;
 use serde_json::{Value, json};
 use training::{Training, waves};
@@ -48,6 +50,10 @@ struct Shape {
 impl Shape {
     /// The first task of the thesis.
     const LISSAJOUS: Self = Self { units: 60, sequences: 12, steps: 1000 };
+
+    fn topology(self) -> Topology {
+        Topology::s_ctrnn(CHANNELS, self.units, 2.0).expect("sizes above 0")
+    }
 
     /// Useful operations of one step of one sequence.
     fn operations(self) -> f64 {
@@ -84,11 +90,16 @@ fn main() {
     let arguments = Arguments::read(5);
     let only = if arguments.measures() { arguments.value("--only") } else { Some("lissajous") };
     let wants = |part: &str| only.is_none_or(|only| only == part);
-    let measure = |shape| {
+    let measure_on = |shape: Shape, data| {
         eprintln!("{shape:?}");
-        measure(shape, arguments.rounds, arguments.set)
+        measure(shape, &data, arguments.rounds, arguments.set)
     };
-    let first = wants("lissajous").then(|| measure(Shape::LISSAJOUS));
+    let measure = |shape: Shape| measure_on(shape, waves(&shape.topology(), shape.sequences, shape.steps));
+    let first = wants("lissajous").then(|| {
+        // One sample more than there are steps: every step has its target.
+        let options = lissajous::Options { sequences: 12, steps: 1001 };
+        measure_on(Shape::LISSAJOUS, lissajous::generate(&options, 1).expect("twelve curves").data)
+    });
     let steps: Vec<_> = match wants("steps") {
         true => [100, 1000, 10_000].map(|steps| measure(Shape { steps, ..Shape::LISSAJOUS })).into(),
         false => Vec::new(),
@@ -111,13 +122,11 @@ fn main() {
     }
 }
 
-fn measure(shape: Shape, rounds: usize, set: InstructionSet) -> Measured {
-    let Shape { units, sequences, steps } = shape;
-    let topology = Topology::s_ctrnn(CHANNELS, units, 2.0).expect("sizes above 0");
-    let data = waves(&topology, sequences, steps);
-    let mut trainings = [1, 2].map(|threads| Training::new(&topology, &data, threads, set));
-    let (network, states) = initialize(&topology, sequences, 1);
-    let mut plain = plain_nalgebra::Epoch::new(&network, &states, &data);
+fn measure(shape: Shape, data: &Dataset, rounds: usize, set: InstructionSet) -> Measured {
+    let sequences = shape.sequences;
+    let mut trainings = [1, 2].map(|threads| Training::new(&shape.topology(), data, threads, set));
+    let (network, states) = initialize(&shape.topology(), sequences, 1);
+    let mut plain = plain_nalgebra::Epoch::new(&network, &states, data);
     agree(&mut trainings[0].learner, &plain.run());
 
     let [mut seconds, mut shares] = [const { [const { Vec::new() }; 2] }; 2];
