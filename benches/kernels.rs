@@ -18,7 +18,7 @@ use machine::{median, on, peak_gflops, seconds_per_call};
 use nalgebra::DMatrix;
 use pulp::{Simd, WithSimd};
 use scrnn::engine::InstructionSet;
-use scrnn::kernels::activation::{exp_slice, tanh};
+use scrnn::kernels::activation::{exp_slice, tanh_rows};
 use scrnn::kernels::outer::{Rows, accumulate};
 use scrnn::kernels::panels::{Columns, Panels, Product, chains_for, multiply};
 use scrnn::kernels::{padded, stride};
@@ -173,7 +173,7 @@ impl Fixture {
 
     fn product<'a, const P: usize>(&'a self, matrices: [&'a Panels; P]) -> Product<'a, P> {
         let source = Columns { values: &self.state, stride: self.state_stride };
-        Product { matrices, sources: [source; P], columns: self.columns, start: &self.start }
+        Product { matrices, sources: [source; P], columns: self.columns, start: &self.start, ahead: &[] }
     }
 }
 
@@ -283,10 +283,7 @@ impl Kernel for Elements<'_> {
     #[inline(always)]
     fn run<S: Simd>(&self, simd: S, out: &mut [f64]) {
         if self.hyperbolic {
-            let (to, from) = (S::as_mut_simd_f64s(out).0, S::as_simd_f64s(self.source).0);
-            for (to, from) in to.iter_mut().zip(from) {
-                *to = tanh(simd, *from);
-            }
+            tanh_rows(simd, self.source, out);
         } else {
             out.copy_from_slice(self.source);
             exp_slice(simd, 1.0, out);

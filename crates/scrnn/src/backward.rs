@@ -22,7 +22,7 @@ use crate::trajectory::Trajectory;
 
 /// `before <- (1 - c^2) sum + (1 - 1/tau) after` for the context units of `columns` columns (2.22).
 #[inline(always)]
-fn retreat<S: Simd>(
+pub(crate) fn retreat<S: Simd>(
     simd: S,
     packed: &Packed,
     sums: &[f64],
@@ -85,7 +85,10 @@ pub(crate) fn run<S: Simd>(
         let states = &trajectory.states[at..at + n * state_stride];
         let sources = [Columns { values: after, stride: delta_stride }];
         let matrices = [&packed.backward];
-        multiply(simd, Product { matrices, sources, columns: active, start: &packed.zeros }, &mut trajectory.drive);
+        // The states of the step before: they were written long ago, and left the cache since.
+        let ahead = &trajectory.states[at - (n * state_stride).min(at)..at];
+        let product = Product { matrices, sources, columns: active, start: &packed.zeros, ahead };
+        multiply(simd, product, &mut trajectory.drive);
         retreat(simd, packed, &trajectory.drive, states, after, before, active);
     }
 }

@@ -49,7 +49,10 @@ impl Block {
 
     /// How many columns have at least `steps` steps.
     pub fn active(&self, steps: usize) -> usize {
-        self.lengths.partition_point(|&length| length >= steps)
+        match self.lengths[self.lengths.len() - 1] >= steps {
+            true => self.lengths.len(),
+            false => self.lengths.partition_point(|&length| length >= steps),
+        }
     }
 
     /// Row `row` of the samples: [column][channel].

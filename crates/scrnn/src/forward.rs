@@ -14,7 +14,7 @@
 use pulp::Simd;
 
 use crate::batch::Block;
-use crate::kernels::activation::tanh;
+use crate::kernels::activation::tanh_rows;
 use crate::kernels::copy_few;
 use crate::kernels::panels::{Columns, Product, multiply};
 use crate::network::Network;
@@ -88,11 +88,8 @@ impl<'a> Plain<'a> {
 #[inline(always)]
 pub(crate) fn activate<S: Simd>(simd: S, packed: &Packed, internal: &[f64], states: &mut [f64], columns: usize) {
     for column in 0..columns {
-        let (u, _) = S::as_simd_f64s(&internal[column * packed.rows..][..packed.rows]);
-        let (c, _) = S::as_mut_simd_f64s(&mut states[column * packed.state_stride..][..packed.rows]);
-        for (c, u) in c.iter_mut().zip(u) {
-            *c = tanh(simd, *u);
-        }
+        let u = &internal[column * packed.rows..][..packed.rows];
+        tanh_rows(simd, u, &mut states[column * packed.state_stride..][..packed.rows]);
     }
 }
 
@@ -109,12 +106,12 @@ pub(crate) fn advance<S: Simd>(
     let (decay, _) = S::as_simd_f64s(&packed.decay);
     for column in 0..columns {
         let (drive, _) = S::as_simd_f64s(&drive[column * packed.rows..][..packed.rows]);
-        let (u, _) = S::as_mut_simd_f64s(&mut internal[column * packed.rows..][..packed.rows]);
-        let (c, _) = S::as_mut_simd_f64s(&mut states[column * packed.state_stride..][..packed.rows]);
-        for (((c, u), drive), decay) in c.iter_mut().zip(u).zip(drive).zip(decay) {
+        let internal = &mut internal[column * packed.rows..][..packed.rows];
+        let (u, _) = S::as_mut_simd_f64s(internal);
+        for ((u, drive), decay) in u.iter_mut().zip(drive).zip(decay) {
             *u = simd.mul_add_f64s(*decay, *u, *drive);
-            *c = tanh(simd, *u);
         }
+        tanh_rows(simd, internal, &mut states[column * packed.state_stride..][..packed.rows]);
     }
 }
 
@@ -139,7 +136,7 @@ pub(crate) fn enter_span<S: Simd>(
     for (row, states) in span.zip(trajectory.states.chunks_exact_mut(n * stride)) {
         let inputs = block.sample_row(row).chunks_exact(packed.n_x);
         for (x, state) in inputs.zip(states.chunks_exact_mut(stride)) {
-            state[packed.rows..packed.rows + packed.n_x].copy_from_slice(x);
+            copy_few(&mut state[packed.rows..packed.rows + packed.n_x], x);
             state[packed.rows + packed.n_x] = 1.0;
         }
     }
@@ -167,7 +164,11 @@ pub(crate) fn run<S: Simd>(
         let sources = [Columns { values: &now[rows..], stride }, Columns { values: now, stride }];
         let internal = &mut trajectory.internal[..n * rows];
         let matrices = [&packed.from_input, &packed.from_context];
-        multiply(simd, Product { matrices, sources, columns: active, start: &packed.bias }, &mut trajectory.drive);
+        multiply(
+            simd,
+            Product { matrices, sources, columns: active, start: &packed.bias, ahead: &[] },
+            &mut trajectory.drive,
+        );
         advance(simd, packed, &trajectory.drive, internal, next, active);
         if record && k > 0 {
             let out = (k - 1) * n * n_x;

@@ -67,10 +67,10 @@ impl InitialStates {
     #[must_use]
     pub fn ln_prior(&self, topology: &Topology, variance: f64) -> f64 {
         let constant = -0.5 * (2.0 * std::f64::consts::PI * variance).ln();
-        let learned: Vec<bool> = topology.per_unit(|group| group.learns_initial_state).collect();
         let mut sum = 0.0;
         for u0 in self.values.chunks_exact(self.units) {
-            for ((&u0, &mean), &learned) in u0.iter().zip(&self.mean).zip(&learned) {
+            let learned = topology.per_unit(|group| group.learns_initial_state);
+            for ((&u0, &mean), learned) in u0.iter().zip(&self.mean).zip(learned) {
                 if learned {
                     sum += constant - (u0 - mean).powi(2) / (2.0 * variance);
                 }

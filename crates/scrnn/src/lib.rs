@@ -88,6 +88,7 @@
 //! | [`forward`], [`likelihood`] | the dynamics and their score, each with a plain reference | 2.5, 2.6 |
 //! | [`learning`] | momentum ascent, its adaptive rate, Adam; the loop with its observer | 2.6.2, D.1 |
 //! | [`generation`], [`recognition`] | open, closed and mixed loop; the search for u_0 | 2.8, 2.9 |
+//! | [`error_regression`] | recognition while samples arrive, over a sliding window | 2.10.2 |
 //! | [`evaluation`], [`checkpoint`] | measures; a trained network as bytes | 3.2.5 |
 //! | [`error`] | what can be wrong with a request | |
 //!
@@ -104,6 +105,7 @@ pub mod checkpoint;
 pub mod dataset;
 pub mod engine;
 pub mod error;
+pub mod error_regression;
 pub mod evaluation;
 pub mod forward;
 pub mod generation;

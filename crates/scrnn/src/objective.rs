@@ -40,6 +40,7 @@ struct Job {
     gradient: AVec<f64>,
     /// [column][unit].
     initial: Vec<f64>,
+    /// [column][channel].
     ln_likelihood: Vec<f64>,
     squared_error: Vec<f64>,
 }
@@ -75,8 +76,8 @@ impl Objective {
                 cut: Cut::new(&packed, &block, recompute),
                 gradient: AVec::new(64),
                 initial: vec![0.0; block.columns() * packed.n_c],
-                ln_likelihood: vec![0.0; block.columns()],
-                squared_error: vec![0.0; block.columns()],
+                ln_likelihood: vec![0.0; block.columns() * packed.n_x],
+                squared_error: vec![0.0; block.columns() * packed.n_x],
                 block,
             })
             .collect();
@@ -120,11 +121,12 @@ impl Objective {
     }
 
     fn collect(&mut self, want: Want) {
-        let n_c = self.packed.n_c;
+        let (n_c, n_x) = (self.packed.n_c, self.packed.n_x);
         for job in &self.jobs {
             for (column, &item) in job.block.items.iter().enumerate() {
-                self.ln_likelihood[item] = job.ln_likelihood[column];
-                self.squared_error[item] = job.squared_error[column];
+                let own = column * n_x..(column + 1) * n_x;
+                self.ln_likelihood[item] = job.ln_likelihood[own.clone()].iter().sum();
+                self.squared_error[item] = job.squared_error[own].iter().sum();
                 if want != Want::Score {
                     let out = &mut self.initial[item * n_c..(item + 1) * n_c];
                     let own = &job.initial[column * n_c..(column + 1) * n_c];
@@ -190,7 +192,7 @@ impl WithSimd for Evaluate<'_> {
         // A state that is no longer finite stays so: it must not hide behind the bounds of tanh.
         for (column, u) in trajectory.internal.chunks_exact(packed.rows).enumerate().take(n) {
             if !u[..packed.n_c].iter().all(|u| u.is_finite()) {
-                job.ln_likelihood[column] = f64::NAN;
+                job.ln_likelihood[column * packed.n_x] = f64::NAN;
             }
         }
         if want == Want::Score {
@@ -272,14 +274,17 @@ fn score_steps<S: Simd>(
         precisions: &mut trajectory.precisions,
     }
     .score(simd, floor);
-    let mut at = 0;
-    for _ in steps {
-        for column in 0..columns {
-            for _ in 0..n_x {
-                job.ln_likelihood[column] += trajectory.terms[at];
-                job.squared_error[column] += trajectory.squares[at];
-                at += 1;
-            }
+    let width = columns * n_x;
+    add_rows(&mut job.ln_likelihood[..width], &trajectory.terms[..len]);
+    add_rows(&mut job.squared_error[..width], &trajectory.squares[..len]);
+}
+
+/// `sums[k] += rows[0][k] + rows[1][k] + ...`, row after row.
+#[inline(always)]
+fn add_rows(sums: &mut [f64], rows: &[f64]) {
+    for row in rows.chunks_exact(sums.len()) {
+        for (sum, value) in sums.iter_mut().zip(row) {
+            *sum += value;
         }
     }
 }

@@ -7,7 +7,7 @@ use aligned_vec::AVec;
 use pulp::Simd;
 
 use crate::forward::{activate, advance};
-use crate::kernels::activation::{exp, tanh};
+use crate::kernels::activation::{exp, tanh_rows};
 use crate::kernels::padded;
 use crate::kernels::panels::{Columns, Product, multiply};
 use crate::packed::Packed;
@@ -81,7 +81,13 @@ impl Stepper {
     pub fn step<S: Simd>(&mut self, simd: S, packed: &Packed) {
         let (rows, stride, columns) = (packed.rows, packed.state_stride, self.columns);
         let matrices = [&packed.from_input, &packed.from_context];
-        let product = Product { matrices, sources: sources(&self.states, rows, stride), columns, start: &packed.bias };
+        let product = Product {
+            matrices,
+            sources: sources(&self.states, rows, stride),
+            columns,
+            start: &packed.bias,
+            ahead: &[],
+        };
         multiply(simd, product, &mut self.drive);
         advance(simd, packed, &self.drive, &mut self.internal, &mut self.states, columns);
 
@@ -91,13 +97,16 @@ impl Stepper {
             sources: sources(&self.states, packed.rows, stride),
             columns,
             start: &packed.output_bias,
+            ahead: &[],
         };
         multiply(simd, product, &mut self.outputs);
+        let outputs = padded(packed.n_out);
+        for (u, y) in self.outputs.chunks_exact(outputs).zip(self.mean.chunks_exact_mut(outputs)) {
+            tanh_rows(simd, u, y);
+        }
         let (u, _) = S::as_simd_f64s(&self.outputs);
-        let (mean, _) = S::as_mut_simd_f64s(&mut self.mean);
         let (variance, _) = S::as_mut_simd_f64s(&mut self.variance);
-        for ((y, v), u) in mean.iter_mut().zip(variance).zip(u) {
-            *y = tanh(simd, *u);
+        for (v, u) in variance.iter_mut().zip(u) {
             *v = exp(simd, *u);
         }
     }

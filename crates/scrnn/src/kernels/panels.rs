@@ -11,11 +11,16 @@
 
 #![allow(clippy::needless_range_loop, reason = "loops over the constant sides of a tile unroll; indices say which")]
 
+use std::hint::black_box;
+
 use aligned_vec::AVec;
 use pulp::{Simd, WithSimd};
 
 use super::{ROWS, accumulators, is_used, padded};
 use crate::engine::InstructionSet;
+
+/// Values of a cache line.
+const LINE: usize = 8;
 
 /// A matrix in panels, zero-padded to whole vectors of rows.
 #[derive(Debug, Clone)]
@@ -106,6 +111,8 @@ pub struct Product<'a, const P: usize> {
     pub columns: usize,
     /// What the sums start from.
     pub start: &'a [f64],
+    /// What will be needed next and may be far away: the product reads it on the way, and so fetches it while it computes.
+    pub ahead: &'a [f64],
 }
 
 /// Multiplies: `out` holds one row of as many values as the matrices have rows for each column.
@@ -189,6 +196,8 @@ impl<const P: usize, const M: usize, const N: usize, const K: usize> WithSimd fo
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { product, row, first, out } = self;
         let height = M * S::F64_LANES;
+        let mut ahead = product.ahead.as_chunks::<LINE>().0.iter().skip(row);
+        let mut fetched = 0.0;
         let mut sums = [[[simd.splat_f64s(0.0); N]; M]; K];
         let (starts, _) = S::as_simd_f64s(&product.start[row..row + height]);
         for m in 0..M {
@@ -211,6 +220,9 @@ impl<const P: usize, const M: usize, const N: usize, const K: usize> WithSimd fo
                 paired[n] = &column[n].as_chunks::<2>().0[..pairs.len()];
             }
             for k in 0..pairs.len() {
+                if let Some(line) = ahead.next() {
+                    fetched += line[0];
+                }
                 for half in 0..2 {
                     for n in 0..N {
                         let x = simd.splat_f64s(paired[n][k][half]);
@@ -230,6 +242,7 @@ impl<const P: usize, const M: usize, const N: usize, const K: usize> WithSimd fo
                 }
             }
         }
+        black_box(fetched);
         let rows = product.matrices[0].rows;
         for n in 0..N {
             let (out, _) = S::as_mut_simd_f64s(&mut out[(first + n) * rows + row..][..height]);

@@ -49,7 +49,7 @@ mod tests {
         #[inline(always)]
         fn with_simd<S: Simd>(self, simd: S) {
             let (matrices, sources) = ([self.matrix], [self.source]);
-            let product = Product { matrices, sources, columns: self.columns, start: self.start };
+            let product = Product { matrices, sources, columns: self.columns, start: self.start, ahead: &[] };
             panels::multiply(simd, product, self.out);
         }
     }

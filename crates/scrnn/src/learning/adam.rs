@@ -145,6 +145,15 @@ impl AdamRule {
         }
     }
 
+    /// Takes over what another rule of the same training remembers; allocates nothing.
+    pub fn copy_from(&mut self, other: &Self) {
+        let own = [&mut self.shared, &mut self.initial, &mut self.mean];
+        for (own, other) in own.into_iter().zip([&other.shared, &other.initial, &other.mean]) {
+            own.first.copy_from_slice(&other.first);
+            own.second.copy_from_slice(&other.second);
+        }
+    }
+
     /// What has to be kept to go on.
     pub fn fields(&mut self) -> Fields<'_> {
         let (parameters, units) = (self.shared.first.len(), self.learns.len());

@@ -94,16 +94,14 @@ struct State {
 
 impl State {
     /// Takes over another state of the same training; allocates nothing.
-    fn copy_from(&mut self, other: &mut Self) {
+    fn copy_from(&mut self, other: &Self) {
         self.network.parameters.as_mut_slice().copy_from_slice(other.network.parameters.as_slice());
         self.initial_states.values_mut().copy_from_slice(other.initial_states.values());
         self.initial_states.mean_mut().copy_from_slice(other.initial_states.mean());
-        let (own, others) = (self.rule.fields(), other.rule.fields());
-        for (own, other) in own.tensors.into_iter().zip(others.tensors) {
-            own.2.copy_from_slice(other.2);
-        }
-        for (own, other) in own.numbers.into_iter().zip(others.numbers) {
-            *own.1 = *other.1;
+        match (&mut self.rule, &other.rule) {
+            (Rule::Momentum(rule), Rule::Momentum(other)) => rule.copy_from(other),
+            (Rule::Adam(rule), Rule::Adam(other)) => rule.copy_from(other),
+            _ => unreachable!("a training keeps its optimiser"),
         }
         self.epoch = other.epoch;
     }
@@ -214,15 +212,15 @@ impl Learner {
 
     /// Learns to the end of the plan, or until the observer stops it.
     pub fn run(&mut self, observer: &mut dyn Observer) -> Outcome {
-        self.last_good.copy_from(&mut self.state);
+        self.last_good.copy_from(&self.state);
         loop {
             self.evaluate();
             if let Some(divergence) = self.divergence() {
-                self.state.copy_from(&mut self.last_good);
+                self.state.copy_from(&self.last_good);
                 self.evaluated = false;
                 return Outcome::Diverged(divergence);
             }
-            self.last_good.copy_from(&mut self.state);
+            self.last_good.copy_from(&self.state);
             let control = observer.epoch(&self.report(), self);
             if self.state.epoch >= self.plan.epochs {
                 return Outcome::Finished;

@@ -110,6 +110,14 @@ impl MomentumRule {
         }
     }
 
+    /// Takes over what another rule of the same training remembers; allocates nothing.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.shared.copy_from_slice(&other.shared);
+        self.initial.copy_from_slice(&other.initial);
+        self.mean.copy_from_slice(&other.mean);
+        self.factor = other.factor;
+    }
+
     /// What has to be kept to go on.
     pub fn fields(&mut self) -> Fields<'_> {
         let (parameters, units) = (self.shared.len(), self.mean.len());

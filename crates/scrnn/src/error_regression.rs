@@ -1,0 +1,573 @@
+//! Error regression (ERS): recognition while it happens (thesis 2.10.2).
+//!
+//! ```text
+//! ln L_reg = sum_{t' = t-W+1..t} sum_i ln N(y-hat_t',i | y_t',i, v_t',i)                      (2.28)
+//! u_{t-W}  <- u_{t-W} + delta u,    delta u_n = alpha_reg d ln L_reg / d u_{t-W} + eta delta u_{n-1}   (2.19)
+//! ```
+//!
+//! Whenever a sample arrives, the last W steps are run again from the internal state before them, in the closed loop
+//! without noise, and that state is moved uphill; then the window's past is overwritten with what follows from it, and
+//! so is the prediction of the next sample. Only the groups whose initial state is learned are moved.
+//!
+//! The gradient is exact: it also runs through the means that the window feeds back to itself. Inputs of the window's
+//! first xi steps are the means predicted before it, or samples where there was no prediction yet.
+
+use aligned_vec::AVec;
+use pulp::{Simd, WithSimd};
+
+use crate::backward::retreat;
+use crate::engine::{InstructionSet, Run};
+use crate::error::{Error, Result};
+use crate::forward::{activate, advance};
+use crate::kernels::activation::{exp_slice, tanh_rows};
+use crate::kernels::panels::{Columns, Panels, Product, chains_for, multiply};
+use crate::kernels::{ROWS, copy_few};
+use crate::likelihood::Predictions;
+use crate::network::Network;
+use crate::packed::Packed;
+use crate::parameters::Block;
+
+/// How the internal state is moved; every sample starts from rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Ascent {
+    /// Gradient ascent with momentum, as in the thesis.
+    Momentum {
+        /// alpha_reg.
+        rate: f64,
+        /// eta.
+        momentum: f64,
+    },
+    /// Adam (Kingma and Ba, 2015), with its usual constants.
+    Adam {
+        /// The step's size in units of the internal state.
+        rate: f64,
+    },
+}
+
+/// How to regress.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ErrorRegressionOptions {
+    /// W, in steps.
+    pub window: usize,
+    /// Forward and backward passes for each sample.
+    pub iterations: usize,
+    /// How the state is moved.
+    pub ascent: Ascent,
+    /// Longest gradient; a longer one is shortened to this length.
+    pub max_norm: Option<f64>,
+    /// Share of the sensed sample in the input of each channel when time goes on: 1 senses, 0 runs on the own prediction.
+    pub sensed: Vec<f64>,
+    /// The same inside of the window; all 0 in the thesis.
+    pub sensed_in_window: Vec<f64>,
+}
+
+impl ErrorRegressionOptions {
+    /// A window of 20 steps and 10 iterations with the thesis' kind of ascent; every channel senses, and the window runs
+    /// in the closed loop.
+    #[must_use]
+    pub fn new(channels: usize) -> Self {
+        Self {
+            window: 20,
+            iterations: 10,
+            ascent: Ascent::Momentum { rate: 1.25e-4, momentum: 0.9 },
+            max_norm: None,
+            sensed: vec![1.0; channels],
+            sensed_in_window: vec![0.0; channels],
+        }
+    }
+
+    fn check(&self, channels: usize) -> Result<()> {
+        if self.window == 0 {
+            return Err(Error::Setting { what: "the window", found: "0".to_owned(), needed: "at least 1 step" });
+        }
+        let positive = |what, value: f64| match value > 0.0 && value.is_finite() {
+            true => Ok(()),
+            false => Err(Error::Setting { what, found: value.to_string(), needed: "a positive number" }),
+        };
+        match self.ascent {
+            Ascent::Adam { rate } => positive("the regression rate", rate)?,
+            Ascent::Momentum { rate, momentum } => {
+                positive("the regression rate", rate)?;
+                if !(0.0..1.0).contains(&momentum) {
+                    let (found, needed) = (momentum.to_string(), "a number from 0 to below 1");
+                    return Err(Error::Setting { what: "the regression's momentum", found, needed });
+                }
+            }
+        }
+        if let Some(norm) = self.max_norm {
+            positive("the longest gradient", norm)?;
+        }
+        for (what, shares) in [("the sensed shares", &self.sensed), ("the window's shares", &self.sensed_in_window)] {
+            if shares.len() != channels {
+                return Err(Error::Length { what: what.to_owned(), found: shares.len(), needed: channels });
+            }
+            if let Some(share) = shares.iter().find(|share| !(0.0..=1.0).contains(*share)) {
+                return Err(Error::Setting { what, found: share.to_string(), needed: "numbers from 0 to 1" });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What one sample's regression did.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Regression {
+    /// Steps in the window.
+    pub steps: usize,
+    /// Iterations that were made.
+    pub iterations: usize,
+    /// ln L_reg of the closed-loop window before the first iteration and after the last; -E without variance units.
+    pub ln_likelihood: [f64; 2],
+    /// Sums of squared errors in the window, before and after.
+    pub squared_error: [f64; 2],
+}
+
+/// A network that runs beside a stream of samples. Everything is allocated at the start.
+///
+/// Row r of the window is the state after its r-th step; row 0 is the tail, u_{t-W}. One row more is the step that
+/// predicts the sample to come.
+#[derive(Debug)]
+pub struct ErrorRegression {
+    packed: Packed,
+    /// Back from the context to the input; rows: channels.
+    to_input: Panels,
+    set: InstructionSet,
+    options: ErrorRegressionOptions,
+    delay: usize,
+    floor: f64,
+    /// Samples observed.
+    observed: usize,
+    /// Steps in the window, at most W.
+    length: usize,
+    /// [row][rows]: u.
+    internal: AVec<f64>,
+    /// [row][state_stride]: c, then the input of the next row's step.
+    states: AVec<f64>,
+    /// [xi + row][channel]: y of the row's step; the first xi are from before the window. Row r + 1 is what sample
+    /// number r of `samples` was predicted as.
+    mean: AVec<f64>,
+    /// [row][channel]: u of the variance units.
+    variance: AVec<f64>,
+    /// [row][channel]: row r is the sample that can be the input of the next row's step.
+    samples: AVec<f64>,
+    /// [row][delta_stride]: d/du of the next row's context, then of this row's outputs.
+    deltas: AVec<f64>,
+    /// [row][channel]: d/du of the mean and the variance units.
+    mean_delta: AVec<f64>,
+    variance_delta: AVec<f64>,
+    terms: AVec<f64>,
+    squares: AVec<f64>,
+    precisions: AVec<f64>,
+    drive: AVec<f64>,
+    drive_with_input: AVec<f64>,
+    /// tanh of the rows that hold outputs; on the way back, d/dx.
+    outputs: AVec<f64>,
+    /// One for each unit: whether it is moved, and the memory of the ascent.
+    moves: Vec<bool>,
+    first: Vec<f64>,
+    second: Vec<f64>,
+    /// v of the sample to come.
+    next_variance: Vec<f64>,
+}
+
+impl ErrorRegression {
+    /// A network at its initial state, before the first sample.
+    ///
+    /// # Errors
+    /// [`Error::Length`] for an initial state or shares of another size than the network's, and [`Error::Setting`] for
+    /// an option out of its range.
+    pub fn new(
+        network: &Network,
+        initial_state: &[f64],
+        options: ErrorRegressionOptions,
+        set: InstructionSet,
+    ) -> Result<Self> {
+        let topology = &network.topology;
+        let (n_x, n_c, delay) = (topology.channels(), topology.context_units(), topology.delay());
+        options.check(n_x)?;
+        if initial_state.len() != n_c {
+            let what = "the initial state".to_owned();
+            return Err(Error::Length { what, found: initial_state.len(), needed: n_c });
+        }
+        let mut packed = Packed::new(topology, set);
+        packed.fill(&network.parameters);
+        let mut to_input = Panels::zeros(n_x, n_c, chains_for(n_x), set);
+        let w_cx = network.parameters.block(Block::ContextFromInput);
+        to_input.fill(n_x, |i, k| packed.rate[k] * w_cx[k * n_x + i]);
+        let window = options.window;
+        let zeros = |count: usize| AVec::from_iter(64, std::iter::repeat_n(0.0, count));
+        let n_v = packed.n_out - n_x;
+        let mut regression = Self {
+            internal: zeros((window + 2) * packed.rows),
+            states: zeros((window + 2) * packed.state_stride),
+            mean: zeros((delay + window + 2) * n_x),
+            variance: zeros((window + 2) * n_v),
+            samples: zeros((window + delay + 1) * n_x),
+            deltas: zeros((window + 2) * packed.delta_stride),
+            mean_delta: zeros((window + 1) * n_x),
+            variance_delta: zeros((window + 1) * n_v),
+            terms: zeros(window * n_x),
+            squares: zeros(window * n_x),
+            precisions: zeros(window * n_x),
+            drive: zeros(packed.rows),
+            drive_with_input: zeros(packed.rows),
+            outputs: zeros(packed.rows),
+            moves: topology.per_unit(|group| group.learns_initial_state).collect(),
+            first: vec![0.0; n_c],
+            second: vec![0.0; n_c],
+            next_variance: vec![0.0; n_v],
+            floor: topology.variance_floor(),
+            observed: 0,
+            length: 0,
+            delay,
+            options,
+            set,
+            to_input,
+            packed,
+        };
+        regression.internal[..n_c].copy_from_slice(initial_state);
+        set.run(Enter(&mut regression));
+        Ok(regression)
+    }
+
+    /// Takes in one sample of N_I values, regresses over the window, and predicts the next sample. `go_on` is asked
+    /// before each iteration; it lets a control loop keep its deadline. Allocates nothing.
+    ///
+    /// # Errors
+    /// [`Error::Length`] for a sample of another size, [`Error::Setting`] for one that is not finite; neither is taken in.
+    pub fn observe(&mut self, sample: &[f64], go_on: &mut dyn FnMut() -> bool) -> Result<Regression> {
+        let n_x = self.packed.n_x;
+        if sample.len() != n_x {
+            return Err(Error::Length { what: "the sample".to_owned(), found: sample.len(), needed: n_x });
+        }
+        if let Some(value) = sample.iter().find(|value| !value.is_finite()) {
+            let (what, needed) = ("a value of the sample", "a finite number");
+            return Err(Error::Setting { what, found: value.to_string(), needed });
+        }
+        let mut done = Regression::default();
+        if self.observed >= self.delay {
+            // The step that predicted this sample joins the window.
+            if self.length == self.options.window {
+                self.slide();
+            } else {
+                self.length += 1;
+            }
+            done.steps = self.length;
+        }
+        // Sample k is the input of step k, which leads to row k + 1 as long as nothing has slid away.
+        let row = self.length + (self.delay - 1).min(self.observed);
+        self.samples[row * n_x..(row + 1) * n_x].copy_from_slice(sample);
+        self.observed += 1;
+        if self.observed > self.delay {
+            let set = self.set;
+            done = set.run(Regress { regression: self, go_on });
+        }
+        if self.observed >= self.delay {
+            let set = self.set;
+            set.run(Predict(self));
+        }
+        Ok(done)
+    }
+
+    /// Steps in the window.
+    #[must_use]
+    pub fn window(&self) -> usize {
+        self.length
+    }
+
+    /// y of the sample to come, N_O values; 0 before xi samples are there.
+    #[must_use]
+    pub fn mean(&self) -> &[f64] {
+        self.mean_of(self.length + 1)
+    }
+
+    /// v of the sample to come, N_O values; empty without variance units.
+    #[must_use]
+    pub fn variance(&self) -> &[f64] {
+        &self.next_variance
+    }
+
+    /// The mean that the window now holds for its step `step` of 0 to [`ErrorRegression::window`]; the last is the
+    /// sample to come.
+    ///
+    /// # Panics
+    /// If there is no such step.
+    #[must_use]
+    pub fn postdicted_mean(&self, step: usize) -> &[f64] {
+        assert!(step <= self.length, "step {step} of a window of {}", self.length);
+        self.mean_of(step + 1)
+    }
+
+    /// The context after step `step` of 0 to [`ErrorRegression::window`], N_C values.
+    ///
+    /// # Panics
+    /// If there is no such step.
+    #[must_use]
+    pub fn context(&self, step: usize) -> &[f64] {
+        assert!(step <= self.length, "step {step} of a window of {}", self.length);
+        &self.states[(step + 1) * self.packed.state_stride..][..self.packed.n_c]
+    }
+
+    /// u at the window's tail, which regression moves, N_C values.
+    #[must_use]
+    pub fn tail(&self) -> &[f64] {
+        &self.internal[..self.packed.n_c]
+    }
+
+    fn mean_of(&self, row: usize) -> &[f64] {
+        &self.mean[(self.delay + row) * self.packed.n_x..][..self.packed.n_x]
+    }
+
+    /// Forgets the window's first step.
+    fn slide(&mut self) {
+        let (packed, rows) = (&self.packed, self.length + 2);
+        let n_v = packed.n_out - packed.n_x;
+        self.internal.copy_within(packed.rows..rows * packed.rows, 0);
+        self.states.copy_within(packed.state_stride..rows * packed.state_stride, 0);
+        self.mean.copy_within(packed.n_x.., 0);
+        self.variance.copy_within(n_v.., 0);
+        self.samples.copy_within(packed.n_x.., 0);
+    }
+
+    /// The input of the step to row `row`: row `row - 1` of the samples, or what it was predicted as xi steps before.
+    #[inline(always)]
+    fn set_input(&mut self, row: usize, in_window: bool) {
+        let n_x = self.packed.n_x;
+        let shares = if in_window { &self.options.sensed_in_window } else { &self.options.sensed };
+        // Counted from the first step ever, the step is number `step`, and its prediction was made in step - xi.
+        let step = self.observed - self.delay + row - self.length;
+        let sample = &self.samples[(row - 1) * n_x..row * n_x];
+        let predicted = &self.mean[row * n_x..(row + 1) * n_x];
+        let x = &mut self.states[(row - 1) * self.packed.state_stride + self.packed.rows..][..n_x];
+        for i in 0..n_x {
+            x[i] = match step > self.delay {
+                true => shares[i] * sample[i] + (1.0 - shares[i]) * predicted[i],
+                false => sample[i],
+            };
+        }
+    }
+
+    /// The context's product of the step to row `row`, and with it the outputs of the row before.
+    #[inline(always)]
+    fn leave<S: Simd>(&mut self, simd: S, row: usize) {
+        let packed = &self.packed;
+        let (n_x, n_c, rows) = (packed.n_x, packed.n_c, packed.rows);
+        let now = &self.states[(row - 1) * packed.state_stride..][..packed.state_stride];
+        let sources = [Columns { values: now, stride: packed.state_stride }];
+        let matrices = [&packed.from_context];
+        let product = Product { matrices, sources, columns: 1, start: &packed.bias, ahead: &[] };
+        multiply(simd, product, &mut self.drive);
+        if row == 1 {
+            return;
+        }
+        let from = n_c / ROWS * ROWS;
+        tanh_rows(simd, &self.drive[from..rows], &mut self.outputs[from..rows]);
+        copy_few(&mut self.mean[(self.delay + row - 1) * n_x..][..n_x], &self.outputs[n_c..n_c + n_x]);
+        if packed.n_out > n_x {
+            copy_few(&mut self.variance[(row - 1) * n_x..][..n_x], &self.drive[n_c + n_x..n_c + 2 * n_x]);
+        }
+    }
+
+    /// The step to row `row`, once its context's product and its input are there (2.27).
+    #[inline(always)]
+    fn arrive<S: Simd>(&mut self, simd: S, row: usize) {
+        let packed = &self.packed;
+        let (rows, stride) = (packed.rows, packed.state_stride);
+        let (before, after) = self.states.split_at_mut(row * stride);
+        let x = &before[(row - 1) * stride + rows..];
+        let (matrices, sources) = ([&packed.from_input], [Columns { values: x, stride }]);
+        let product = Product { matrices, sources, columns: 1, start: &self.drive, ahead: &[] };
+        multiply(simd, product, &mut self.drive_with_input);
+        self.internal.copy_within((row - 1) * rows..row * rows, row * rows);
+        advance(simd, packed, &self.drive_with_input, &mut self.internal[row * rows..], after, 1);
+    }
+
+    /// Runs the window from its tail.
+    #[inline(always)]
+    fn run_window<S: Simd>(&mut self, simd: S) {
+        activate(simd, &self.packed, &self.internal, &mut self.states, 1);
+        for row in 1..=self.length {
+            self.leave(simd, row);
+            self.set_input(row, true);
+            self.arrive(simd, row);
+        }
+        self.leave(simd, self.length + 1);
+    }
+
+    /// (2.28) and its gradient at the window's outputs.
+    #[inline(always)]
+    fn score<S: Simd>(&mut self, simd: S) -> (f64, f64) {
+        let n_x = self.packed.n_x;
+        let len = self.length * n_x;
+        self.mean_delta[..len].copy_from_slice(&self.mean[(self.delay + 1) * n_x..][..len]);
+        let variance: &mut [f64] = match self.variance_delta.is_empty() {
+            true => &mut [],
+            false => {
+                self.variance_delta[..len].copy_from_slice(&self.variance[n_x..][..len]);
+                &mut self.variance_delta[..len]
+            }
+        };
+        // The target of row r's step is xi samples after its input.
+        let target = &self.samples[self.delay * n_x..][..len];
+        Predictions {
+            mean: &mut self.mean_delta[..len],
+            variance,
+            target,
+            terms: &mut self.terms,
+            squares: &mut self.squares,
+            precisions: &mut self.precisions,
+        }
+        .score(simd, self.floor);
+        (self.terms[..len].iter().sum(), self.squares[..len].iter().sum())
+    }
+
+    /// d ln L_reg / du of the window's tail, left in the first delta row (2.22).
+    #[inline(always)]
+    fn run_back<S: Simd>(&mut self, simd: S) {
+        let packed = &self.packed;
+        let (n_x, n_c, stride) = (packed.n_x, packed.n_c, packed.delta_stride);
+        self.deltas[self.length * stride..][..n_c].fill(0.0);
+        for row in (0..=self.length).rev() {
+            let outputs = &mut self.deltas[row * stride + n_c..][..packed.n_out];
+            if row == 0 {
+                outputs.fill(0.0);
+            } else {
+                copy_few(&mut outputs[..n_x], &self.mean_delta[(row - 1) * n_x..][..n_x]);
+                if packed.n_out > n_x {
+                    copy_few(&mut outputs[n_x..], &self.variance_delta[(row - 1) * n_x..][..n_x]);
+                }
+            }
+            let after = &self.deltas[row * stride..][..stride];
+            let (matrices, sources) = ([&packed.backward], [Columns { values: after, stride }]);
+            let product = Product { matrices, sources, columns: 1, start: &packed.zeros, ahead: &[] };
+            multiply(simd, product, &mut self.drive);
+            let states = &self.states[row * packed.state_stride..];
+            if row == 0 {
+                // Nothing lies before the tail: its gradient takes the place of the row after it.
+                self.drive_with_input.copy_from_slice(&after[..packed.rows]);
+                retreat(simd, packed, &self.drive, states, &self.drive_with_input, &mut self.deltas, 1);
+                return;
+            }
+            let (before, after) = self.deltas.split_at_mut(row * stride);
+            retreat(simd, packed, &self.drive, states, after, &mut before[(row - 1) * stride..], 1);
+            // The row's input was predicted xi steps before, perhaps in the window.
+            if row > self.delay {
+                let du = &before[(row - 1) * stride..][..stride];
+                let (matrices, sources) = ([&self.to_input], [Columns { values: du, stride }]);
+                let product = Product { matrices, sources, columns: 1, start: &packed.zeros, ahead: &[] };
+                multiply(simd, product, &mut self.outputs);
+                let made = row - self.delay;
+                let y = &self.mean[(self.delay + made) * n_x..][..n_x];
+                let delta = &mut self.mean_delta[(made - 1) * n_x..][..n_x];
+                for i in 0..n_x {
+                    let share = 1.0 - self.options.sensed_in_window[i];
+                    delta[i] += (1.0 - y[i] * y[i]) * share * self.outputs[i];
+                }
+            }
+        }
+    }
+
+    /// Moves the tail; `iteration` counts from 0.
+    #[inline(always)]
+    fn move_tail(&mut self, iteration: usize) {
+        const BETA: (f64, f64) = (0.9, 0.999);
+        let n_c = self.packed.n_c;
+        let (u, gradient) = (&mut self.internal[..n_c], &self.deltas[..n_c]);
+        let square = gradient.iter().zip(&self.moves).map(|(g, moves)| if *moves { g * g } else { 0.0 }).sum::<f64>();
+        let scale = match self.options.max_norm {
+            Some(most) if square > most * most => most / square.sqrt(),
+            _ => 1.0,
+        };
+        let count = i32::try_from(iteration + 1).unwrap_or(i32::MAX);
+        let (correct_first, correct_second) = (1.0 / (1.0 - BETA.0.powi(count)), 1.0 / (1.0 - BETA.1.powi(count)));
+        for i in 0..n_c {
+            if !self.moves[i] {
+                continue;
+            }
+            let g = scale * gradient[i];
+            u[i] += match self.options.ascent {
+                Ascent::Momentum { rate, momentum } => {
+                    self.first[i] = rate * g + momentum * self.first[i];
+                    self.first[i]
+                }
+                Ascent::Adam { rate } => {
+                    self.first[i] = BETA.0 * self.first[i] + (1.0 - BETA.0) * g;
+                    self.second[i] = BETA.1 * self.second[i] + (1.0 - BETA.1) * g * g;
+                    rate * self.first[i] * correct_first / ((self.second[i] * correct_second).sqrt() + 1e-8)
+                }
+            };
+        }
+    }
+}
+
+/// The context of the initial state.
+struct Enter<'a>(&'a mut ErrorRegression);
+
+impl WithSimd for Enter<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        activate(simd, &self.0.packed, &self.0.internal, &mut self.0.states, 1);
+    }
+}
+
+/// The step that predicts the sample to come.
+struct Predict<'a>(&'a mut ErrorRegression);
+
+impl WithSimd for Predict<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let regression = self.0;
+        let row = regression.length + 1;
+        regression.leave(simd, row);
+        regression.set_input(row, false);
+        regression.arrive(simd, row);
+        regression.leave(simd, row + 1);
+        let n_x = regression.packed.n_x;
+        if !regression.next_variance.is_empty() {
+            regression.next_variance.copy_from_slice(&regression.variance[row * n_x..][..n_x]);
+            exp_slice(simd, 1.0, &mut regression.next_variance);
+            regression.next_variance.iter_mut().for_each(|v| *v += regression.floor);
+        }
+    }
+}
+
+/// The iterations over one window.
+struct Regress<'a> {
+    regression: &'a mut ErrorRegression,
+    go_on: &'a mut dyn FnMut() -> bool,
+}
+
+impl WithSimd for Regress<'_> {
+    type Output = Regression;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Regression {
+        let Self { regression, go_on } = self;
+        regression.first.fill(0.0);
+        regression.second.fill(0.0);
+        let mut done = Regression { steps: regression.length, ..Regression::default() };
+        while done.iterations < regression.options.iterations && go_on() {
+            regression.run_window(simd);
+            let (ln_likelihood, squared_error) = regression.score(simd);
+            if done.iterations == 0 {
+                (done.ln_likelihood, done.squared_error) = ([ln_likelihood; 2], [squared_error; 2]);
+            }
+            regression.run_back(simd);
+            regression.move_tail(done.iterations);
+            done.iterations += 1;
+        }
+        if done.iterations > 0 {
+            regression.run_window(simd);
+            (done.ln_likelihood[1], done.squared_error[1]) = regression.score(simd);
+        }
+        done
+    }
+}
+
+#[cfg(test)]
+#[path = "error_regression_tests.rs"]
+mod tests;

@@ -1,0 +1,246 @@
+use super::*;
+use crate::engine::Engine;
+use crate::forward::Plain;
+use crate::generation::{Feedback, GenerationOptions, Start, generate};
+use crate::initialization::initialize;
+use crate::likelihood::ln_gaussian;
+use crate::topology::{Group, Prediction, Topology};
+
+/// A network of uneven sizes with weights that matter.
+fn network(delay: usize, variance: bool, groups: Vec<Group>) -> Network {
+    let prediction = if variance { Prediction::MeanAndVariance { floor: 0.01 } } else { Prediction::Mean };
+    let topology = Topology::new(3, delay, groups, prediction).unwrap();
+    let (mut network, _) = initialize(&topology, 1, 11);
+    for (k, w) in network.parameters.as_mut_slice().iter_mut().enumerate() {
+        *w = 3.0 * *w + 0.2 * (1.3 * k as f64).sin();
+    }
+    network
+}
+
+fn fast_and_slow() -> Vec<Group> {
+    vec![Group::fast(9, 2.0), Group::slow(4, 8.0)]
+}
+
+fn sample(t: usize) -> [f64; 3] {
+    let t = t as f64;
+    [0.6 * (0.7 * t).sin(), 0.5 * (0.3 * t).cos(), 0.3 * (0.4 * t + 1.0).sin()]
+}
+
+fn u0(network: &Network) -> Vec<f64> {
+    (0..network.topology.context_units()).map(|i| 0.8 * (2.1 * i as f64).cos()).collect()
+}
+
+fn observe_all(regression: &mut ErrorRegression, count: usize) -> Regression {
+    let mut last = Regression::default();
+    for t in 0..count {
+        last = regression.observe(&sample(t), &mut || true).unwrap();
+    }
+    last
+}
+
+/// Runs the window, scores it and goes back; gives ln L_reg and the gradient at its tail.
+struct Evaluate<'a>(&'a mut ErrorRegression);
+
+impl WithSimd for Evaluate<'_> {
+    type Output = (f64, Vec<f64>);
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> (f64, Vec<f64>) {
+        self.0.run_window(simd);
+        let (ln_likelihood, _) = self.0.score(simd);
+        self.0.run_back(simd);
+        (ln_likelihood, self.0.deltas[..self.0.packed.n_c].to_vec())
+    }
+}
+
+/// (2.28) in plain loops. `means` are those predicted before the window, oldest first; `first` is the number of the
+/// window's first step.
+fn plain(network: &Network, tail: &[f64], means: &[f64], first: usize, steps: usize, shares: &[f64]) -> f64 {
+    let delay = network.topology.delay();
+    let mut state = Plain::new(network, tail);
+    let mut means: Vec<Vec<f64>> = means.chunks(3).map(<[f64]>::to_vec).collect();
+    let mut sum = 0.0;
+    for step in first..first + steps {
+        let sensed = sample(step);
+        let fed_back = &means[step - first];
+        let mix = |i: usize| shares[i] * sensed[i] + (1.0 - shares[i]) * fed_back[i];
+        let x: Vec<f64> = if step < delay { sensed.to_vec() } else { (0..3).map(mix).collect() };
+        state.step(&x);
+        means.push(state.y.clone());
+        for (i, target) in sample(step + delay).iter().enumerate() {
+            sum += match state.v.get(i) {
+                Some(&v) => ln_gaussian(*target, state.y[i], v),
+                None => -0.5 * (target - state.y[i]).powi(2),
+            };
+        }
+    }
+    sum
+}
+
+#[test]
+fn the_gradient_at_the_tail_agrees_with_central_differences() {
+    for (delay, variance, count, shares) in [
+        (1, true, 30, [0.0; 3]),
+        (1, false, 5, [0.0; 3]),
+        (2, true, 30, [0.25, 0.0, 1.0]),
+        (5, true, 40, [0.0; 3]),
+        (5, false, 9, [0.5; 3]),
+    ] {
+        let network = network(delay, variance, fast_and_slow());
+        let options = ErrorRegressionOptions {
+            window: 12,
+            iterations: 0,
+            sensed_in_window: shares.to_vec(),
+            ..ErrorRegressionOptions::new(3)
+        };
+        for set in InstructionSet::available() {
+            let mut regression = ErrorRegression::new(&network, &u0(&network), options.clone(), set).unwrap();
+            observe_all(&mut regression, count);
+            let (steps, tail) = (regression.window(), regression.tail().to_vec());
+            assert_eq!(steps, 12.min(count - delay));
+            let first = count - delay - steps;
+            let before = regression.mean[3..3 * (delay + 1)].to_vec();
+            let (ln_likelihood, gradient) = set.run(Evaluate(&mut regression));
+            let at = |tail: &[f64]| plain(&network, tail, &before, first, steps, &shares);
+            assert!((ln_likelihood - at(&tail)).abs() < 1e-10 * (1.0 + ln_likelihood.abs()));
+            for i in 0..tail.len() {
+                let moved = |by: f64| {
+                    let mut tail = tail.clone();
+                    tail[i] += by;
+                    at(&tail)
+                };
+                let (h, d) = (1e-3, |h: f64| (moved(h) - moved(-h)) / (2.0 * h));
+                let differences = (4.0 * d(h) - d(2.0 * h)) / 3.0;
+                let error = (gradient[i] - differences).abs();
+                assert!(
+                    error < 1e-6 * (1.0 + differences.abs()),
+                    "{set}, delay {delay}, unit {i}: {} against {differences}",
+                    gradient[i]
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn without_iterations_it_predicts_as_the_open_loop_does() {
+    for delay in [1, 3] {
+        let network = network(delay, true, fast_and_slow());
+        let options = ErrorRegressionOptions { window: 4, iterations: 0, ..ErrorRegressionOptions::new(3) };
+        let u0 = u0(&network);
+        let mut regression = ErrorRegression::new(&network, &u0, options, InstructionSet::best()).unwrap();
+        let sensed: Vec<f64> = (0..25).flat_map(sample).collect();
+        let options = GenerationOptions { steps: 25, feedback: Feedback::open(3), seed: 1, contexts: true };
+        let start = Start { initial_state: &u0, sensed: &sensed };
+        let open = &generate(&network, &[start], &options, &Engine::serial()).unwrap()[0];
+        for t in 0..25 {
+            regression.observe(&sample(t), &mut || true).unwrap();
+            // Sample t + 1 is what step t + 1 - delay predicts.
+            let Some(step) = (t + 1).checked_sub(delay) else { continue };
+            let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-13);
+            assert!(near(regression.mean(), &open.mean[3 * step..3 * step + 3]), "step {step}");
+            assert!(near(regression.variance(), &open.variance[3 * step..3 * step + 3]), "step {step}");
+            assert!(near(regression.context(regression.window()), &open.contexts[13 * step..13 * step + 13]));
+        }
+    }
+}
+
+#[test]
+fn regression_finds_the_state_that_explains_a_stream_and_leaves_fast_units_alone() {
+    // A network with a long memory follows its own sequence; the stream comes from another initial state.
+    let groups = vec![Group::fast(9, 2.0), Group::slow(4, 60.0)];
+    let network = network(2, false, groups);
+    let made = |slow: f64| {
+        let mut u0 = vec![0.0; 13];
+        u0[9..].fill(slow);
+        let options = GenerationOptions { steps: 60, feedback: Feedback::closed(3, false), seed: 1, contexts: false };
+        let start = Start { initial_state: &u0, sensed: &[0.1; 6] };
+        (u0.clone(), generate(&network, &[start], &options, &Engine::serial()).unwrap().remove(0).mean)
+    };
+    let ((other, _), (_, stream)) = (made(-0.9), made(0.9));
+    let ascent = Ascent::Adam { rate: 0.05 };
+    let options = ErrorRegressionOptions {
+        window: 15,
+        iterations: 20,
+        ascent,
+        max_norm: None,
+        sensed: vec![0.0; 3],
+        ..ErrorRegressionOptions::new(3)
+    };
+    let run = |iterations| {
+        let options = ErrorRegressionOptions { iterations, ..options.clone() };
+        let mut regression = ErrorRegression::new(&network, &other, options, InstructionSet::best()).unwrap();
+        let (mut late, mut first) = (0.0, None);
+        for (t, sample) in [[0.1; 3]; 2].iter().map(|x| &x[..]).chain(stream.chunks(3)).enumerate() {
+            if t >= 40 {
+                late += regression.mean().iter().zip(sample).map(|(y, x)| (y - x).powi(2)).sum::<f64>();
+            }
+            let done = regression.observe(sample, &mut || true).unwrap();
+            if done.steps == 1 {
+                first = Some(regression.tail().to_vec());
+            }
+        }
+        (late, first.unwrap())
+    };
+    let ((with, tail), (without, _)) = (run(20), run(0));
+    assert!(with < 0.05 * without, "{ascent:?}: {with} with, {without} without");
+    assert_eq!(tail[..9], other[..9]);
+    assert!(tail[9..].iter().zip(&other[9..]).all(|(a, b)| a != b));
+}
+
+#[test]
+fn small_steps_always_lead_uphill() {
+    let network = network(2, true, fast_and_slow());
+    for momentum in [0.0, 0.5] {
+        let ascent = Ascent::Momentum { rate: 1e-4, momentum };
+        let options = ErrorRegressionOptions { ascent, ..ErrorRegressionOptions::new(3) };
+        let mut regression = ErrorRegression::new(&network, &u0(&network), options, InstructionSet::best()).unwrap();
+        for t in 0..60 {
+            let done = regression.observe(&sample(t), &mut || true).unwrap();
+            assert_eq!(done.iterations, if t < 2 { 0 } else { 10 });
+            assert!(t < 2 || done.ln_likelihood[1] > done.ln_likelihood[0], "sample {t}: {:?}", done.ln_likelihood);
+        }
+    }
+}
+
+#[test]
+fn a_control_loop_can_stop_it_at_any_iteration() {
+    let network = network(1, true, fast_and_slow());
+    let options = ErrorRegressionOptions { iterations: 50, ..ErrorRegressionOptions::new(3) };
+    let mut regression = ErrorRegression::new(&network, &u0(&network), options, InstructionSet::best()).unwrap();
+    observe_all(&mut regression, 5);
+    let mut asked = 0;
+    let mut go_on = || {
+        asked += 1;
+        asked <= 3
+    };
+    let done = regression.observe(&sample(5), &mut go_on).unwrap();
+    assert_eq!((done.iterations, done.steps), (3, 5));
+    assert!(done.ln_likelihood[1] > done.ln_likelihood[0]);
+    let tail = regression.tail().to_vec();
+    let done = regression.observe(&sample(6), &mut || false).unwrap();
+    assert_eq!((done.iterations, regression.tail()), (0, &tail[..]));
+}
+
+#[test]
+fn senseless_requests_are_refused_and_leave_no_trace() {
+    let network = network(1, true, fast_and_slow());
+    let set = InstructionSet::best();
+    let refuse = |change: &dyn Fn(&mut ErrorRegressionOptions)| {
+        let mut options = ErrorRegressionOptions::new(3);
+        change(&mut options);
+        ErrorRegression::new(&network, &u0(&network), options, set).unwrap_err().to_string()
+    };
+    assert!(refuse(&|options| options.window = 0).starts_with("the window is 0"));
+    assert!(refuse(&|options| options.ascent = Ascent::Adam { rate: -1.0 }).contains("rate is -1"));
+    assert!(refuse(&|options| options.sensed = vec![1.0; 2]).contains("holds 2 values; needed: 3"));
+    assert!(refuse(&|options| options.sensed_in_window[1] = 1.5).contains("is 1.5; needed: numbers from 0 to 1"));
+
+    let options = ErrorRegressionOptions::new(3);
+    let mut regression = ErrorRegression::new(&network, &u0(&network), options, set).unwrap();
+    observe_all(&mut regression, 4);
+    let before = regression.mean().to_vec();
+    assert!(regression.observe(&[0.0, f64::NAN, 0.0], &mut || true).unwrap_err().to_string().contains("is NaN"));
+    assert!(regression.observe(&[0.0], &mut || true).is_err());
+    assert_eq!((regression.mean(), regression.window()), (&before[..], 3));
+}

@@ -1,0 +1,55 @@
+//! What is promised to allocate nothing allocates nothing.
+
+use scrnn::dataset::{Dataset, Sequence};
+use scrnn::engine::{Engine, InstructionSet};
+use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions};
+use scrnn::initialization::initialize;
+use scrnn::learning::{Control, EpochReport, Learner, Plan};
+use scrnn::topology::{Group, Prediction, Topology};
+
+fn wave(steps: usize) -> Vec<f64> {
+    (0..2 * steps).map(|k| 0.6 * (0.3 * k as f64).sin()).collect()
+}
+
+#[test]
+fn a_control_step_of_error_regression_allocates_nothing() {
+    let groups = vec![Group::fast(20, 2.0), Group::slow(7, 30.0)];
+    let topology = Topology::new(2, 3, groups, Prediction::MeanAndVariance { floor: 0.0 }).unwrap();
+    let (network, states) = initialize(&topology, 1, 1);
+    for set in InstructionSet::available() {
+        let options = ErrorRegressionOptions { window: 9, ..ErrorRegressionOptions::new(2) };
+        let mut regression = ErrorRegression::new(&network, states.sequence(0), options, set).unwrap();
+        let samples = wave(40);
+        let counted = allocation_counter::measure(|| {
+            for sample in samples.chunks(2) {
+                regression.observe(sample, &mut || true).unwrap();
+            }
+        });
+        assert_eq!((counted.count_total, regression.window()), (0, 9), "{set}");
+    }
+}
+
+#[test]
+fn after_the_first_epochs_an_epoch_allocates_nothing() {
+    let sequences = [30, 45, 12].map(|steps| Sequence::new("", 2, wave(steps)).unwrap());
+    let data = Dataset::new(Dataset::numbered_channels(2), sequences.to_vec()).unwrap();
+    let topology = Topology::s_ctrnn(2, 13, 2.0).unwrap();
+    for recompute in [false, true] {
+        let (network, states) = initialize(&topology, 3, 1);
+        let plan = Plan { epochs: 20, recompute, ..Plan::default() };
+        let mut learner = Learner::new(network, states, &data, plan, &Engine::serial()).unwrap();
+        // Counting begins and ends inside of the training, where the observer stands.
+        let mut epochs = 0;
+        learner.run(&mut |_: &EpochReport, _: &Learner| {
+            epochs += 1;
+            if epochs < 3 { Control::Continue } else { Control::Stop }
+        });
+        let counted = allocation_counter::measure(|| {
+            learner.run(&mut |_: &EpochReport, _: &Learner| {
+                epochs += 1;
+                if epochs < 15 { Control::Continue } else { Control::Stop }
+            });
+        });
+        assert_eq!((epochs, counted.count_total), (15, 0), "recompute {recompute}");
+    }
+}
