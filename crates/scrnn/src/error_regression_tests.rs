@@ -1,3 +1,5 @@
+//! The gradient of error regression, what it finds, and what it refuses.
+
 use super::*;
 use crate::engine::Engine;
 use crate::forward::Plain;

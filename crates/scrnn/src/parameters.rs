@@ -39,6 +39,12 @@ impl Block {
         Self::VarianceBias,
     ];
 
+    /// Whether it holds biases.
+    #[must_use]
+    pub const fn is_bias(self) -> bool {
+        matches!(self, Self::ContextBias | Self::MeanBias | Self::VarianceBias)
+    }
+
     /// The block's public name, as in a checkpoint.
     #[must_use]
     pub fn name(self) -> &'static str {

@@ -146,6 +146,7 @@ fn check_adam(options: &Adam) -> Check {
     below_one(&key("warm_up"), options.warm_up)?;
     not_negative(&key("final_rate"), options.final_rate)?;
     not_negative(&key("clip_norm"), options.clip_norm)?;
+    not_negative(&key("weight_decay"), options.weight_decay)?;
     not_negative(&key("initial_state_factor"), options.initial_state_factor)?;
     not_negative(&key("mean_factor"), options.mean_factor)?;
     below_one(&key("beta1"), options.beta1)?;

@@ -185,9 +185,30 @@ impl Default for AdaptiveRate {
 
 impl From<&Adam> for learning::Adam {
     fn from(options: &Adam) -> Self {
-        let &Adam { rate, warm_up, final_rate, clip_norm, initial_state_factor, mean_factor, beta1, beta2, epsilon } =
-            options;
-        Self { rate, warm_up, final_rate, clip_norm, initial_state_factor, mean_factor, beta1, beta2, epsilon }
+        let &Adam {
+            rate,
+            warm_up,
+            final_rate,
+            clip_norm,
+            weight_decay,
+            initial_state_factor,
+            mean_factor,
+            beta1,
+            beta2,
+            epsilon,
+        } = options;
+        Self {
+            rate,
+            warm_up,
+            final_rate,
+            clip_norm,
+            weight_decay,
+            initial_state_factor,
+            mean_factor,
+            beta1,
+            beta2,
+            epsilon,
+        }
     }
 }
 
@@ -198,12 +219,24 @@ impl Default for Adam {
             warm_up,
             final_rate,
             clip_norm,
+            weight_decay,
             initial_state_factor,
             mean_factor,
             beta1,
             beta2,
             epsilon,
         } = learning::Adam::default();
-        Self { rate, warm_up, final_rate, clip_norm, initial_state_factor, mean_factor, beta1, beta2, epsilon }
+        Self {
+            rate,
+            warm_up,
+            final_rate,
+            clip_norm,
+            weight_decay,
+            initial_state_factor,
+            mean_factor,
+            beta1,
+            beta2,
+            epsilon,
+        }
     }
 }

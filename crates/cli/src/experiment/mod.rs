@@ -258,6 +258,8 @@ pub struct Adam {
     pub final_rate: f64,
     /// The gradient's norm is cut down to this; 0 never cuts.
     pub clip_norm: f64,
+    /// Every update takes this times the rate off each weight; biases keep theirs.
+    pub weight_decay: f64,
     /// Initial states learn at this many times the rate.
     pub initial_state_factor: f64,
     /// Their mean learns at this many times the rate.

@@ -5,6 +5,7 @@
 //! theta <- theta + rate(n) (m / (1 - beta1^n)) / (sqrt(q / (1 - beta2^n)) + epsilon)
 //! ```
 //!
+//! before which weights w <- (1 - rate(n) decay) w if decay is above 0 (decoupled weight decay, Loshchilov and Hutter 2019).
 //! Initial states are written u_0 = mean + s z, s = min(sigma_IS, 1). Then d ln L_all / dz = s d ln L_out / du_0 -
 //! (s / sigma_IS)^2 z, and moving the mean moves all u_0 with it, so its gradient has no prior term: neither is stiff,
 //! however narrow the prior.
@@ -12,7 +13,7 @@
 use super::plan::Adam;
 use super::state::Fields;
 use crate::initial_states::InitialStates;
-use crate::parameters::{Gradients, Parameters};
+use crate::parameters::{Block, Gradients, Parameters};
 use crate::topology::Topology;
 
 /// First and second moments of one list of parameters.
@@ -119,6 +120,12 @@ impl AdamRule {
         for (out, g) in scratch.iter_mut().zip(gradients.as_slice()) {
             *out = g * (clip / self.terms.0);
         }
+        if adam.weight_decay > 0.0 {
+            let keep = 1.0 - (rate * adam.weight_decay).min(1.0);
+            for block in Block::ALL.into_iter().filter(|block| !block.is_bias()) {
+                parameters.block_mut(block).iter_mut().for_each(|w| *w *= keep);
+            }
+        }
         self.shared.ascend(&adam, update, rate, scratch, parameters.as_mut_slice());
 
         let units = self.learns.len();
@@ -175,6 +182,22 @@ impl AdamRule {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn weight_decay_shrinks_weights_and_leaves_biases() {
+        let topology = Topology::s_ctrnn(2, 3, 2.0).unwrap();
+        let (mut network, mut states) = crate::initialization::initialize(&topology, 1, 5);
+        network.parameters.as_mut_slice().fill(0.5);
+        let options = Adam { rate: 0.1, warm_up: 0.0, weight_decay: 0.2, ..Adam::default() };
+        let mut rule = AdamRule::new(options, &topology, &states, 10, 1.0, 10);
+        // Without a gradient nothing else moves.
+        let (gradients, initial) = (Parameters::zeros(&topology), [0.0; 3]);
+        rule.ascend(0, &gradients, &initial, &mut network.parameters, &mut states);
+        for block in Block::ALL {
+            let expected = if block.is_bias() { 0.5 } else { 0.5 * 0.98 };
+            assert!(network.parameters.block(block).iter().all(|w| (w - expected).abs() < 1e-15), "{block:?}");
+        }
+    }
 
     #[test]
     fn the_rate_rises_and_falls_on_its_schedule() {

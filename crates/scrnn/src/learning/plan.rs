@@ -97,6 +97,9 @@ pub struct Adam {
     pub final_rate: f64,
     /// Longest gradient of the shared parameters; 0 leaves it as it is.
     pub clip_norm: f64,
+    /// Share of every weight that a rate of 1 would take away at each update, biases aside (decoupled, Loshchilov and
+    /// Hutter, 2019): smooth networks for short data.
+    pub weight_decay: f64,
     /// Factor on the rate for initial states.
     pub initial_state_factor: f64,
     /// Factor on the rate for their mean.
@@ -116,6 +119,7 @@ impl Default for Adam {
             warm_up: 0.02,
             final_rate: 0.0,
             clip_norm: 1.0,
+            weight_decay: 0.0,
             initial_state_factor: 3.0,
             mean_factor: 3.0,
             beta1: 0.9,
@@ -154,6 +158,7 @@ impl Plan {
                 share("adam.warm_up", adam.warm_up)?;
                 not_negative("adam.final_rate", adam.final_rate)?;
                 not_negative("adam.clip_norm", adam.clip_norm)?;
+                not_negative("adam.weight_decay", adam.weight_decay)?;
                 not_negative("adam.initial_state_factor", adam.initial_state_factor)?;
                 not_negative("adam.mean_factor", adam.mean_factor)?;
                 share("adam.beta1", adam.beta1)?;
