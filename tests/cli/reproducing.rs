@@ -1,8 +1,11 @@
 //! `scrnn reproduce` and `scrnn report` from outside: what they leave behind, and that it can be trusted. Networks are
 //! hardly trained here; how well they do in earnest stands in docs/reproduction.md.
 
+use std::process::{Command, Stdio};
+
 use serde_json::Value;
 
+use crate::resuming::wait_for;
 use crate::{Place, SINE};
 
 /// What a page needs to stand on its own, and to be read by all.
@@ -92,6 +95,32 @@ fn the_sine_wave_is_reproduced_with_all_that_belongs_to_it() {
     place.ok("reproduce sinusoid --epochs 60 --seeds 3 --seed 4 --out serial --threads 1");
     assert_eq!(without_times(metrics(&place, "serial")), without_times(found));
     assert_eq!(place.read("serial/seed-5/checkpoint.safetensors"), checkpoint);
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_reproduction_leaves_no_page_and_goes_on() {
+    let place = Place::new();
+    let line = "reproduce sinusoid --epochs 3000 --seeds 2 --threads 2 --out";
+    place.ok(&format!("{line} whole"));
+    let child = Command::new(env!("CARGO_BIN_EXE_scrnn"))
+        .current_dir(&place.0)
+        .args(line.split_whitespace())
+        .arg("cut")
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    wait_for(&place, "cut/seed-1/checkpoint.safetensors");
+    wait_for(&place, "cut/seed-2/checkpoint.safetensors");
+    Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let output = child.wait_with_output().unwrap();
+    let err = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(130), "{err}");
+    assert!(err.contains("the same command goes on"), "{err}");
+    assert!(!place.path("cut/report.html").exists() && !place.path("cut/metrics.json").exists());
+    place.ok(&format!("{line} cut"));
+    assert_eq!(without_times(metrics(&place, "cut")), without_times(metrics(&place, "whole")));
 }
 
 #[test]

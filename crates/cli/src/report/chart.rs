@@ -128,8 +128,8 @@ impl Panel {
         Self { title: title.into(), x, y, series, failed: false }
     }
 
-    /// The same with the vertical axis from 0.
-    pub fn from_zero(mut self) -> Self {
+    /// The same with its vertical axis from 0.
+    pub fn with_zero(mut self) -> Self {
         self.y.0 = 0.0;
         self
     }
@@ -299,15 +299,9 @@ impl Chart {
             builder.caption(&panel.title, (FONT, size).into_font().color(&ink));
         }
         let mut chart = builder.build_cartesian_2d(panel.x.0..panel.x.1, panel.y.0..panel.y.1)?;
-        let digits = |(low, high): (f64, f64)| match high - low {
-            span if span >= 20.0 => 0,
-            span if span >= 2.0 => 1,
-            span if span > 0.0 => (1.5 - span.log10()).ceil().clamp(1.0, 6.0) as usize,
-            _ => 2,
-        };
-        let (x_digits, y_digits) = (digits(panel.x), digits(panel.y));
-        let format_x = move |value: &f64| shown(*value, x_digits);
-        let format_y = move |value: &f64| shown(*value, y_digits);
+        let (x_span, y_span) = (panel.x.1 - panel.x.0, panel.y.1 - panel.y.0);
+        let format_x = move |value: &f64| shown(*value, x_span);
+        let format_y = move |value: &f64| shown(*value, y_span);
         let mut mesh = chart.configure_mesh();
         mesh.axis_style(Tone::Data.colour())
             .light_line_style(TRANSPARENT)
@@ -363,11 +357,16 @@ impl Chart {
     }
 }
 
-/// A number on an axis; small ones with as many digits as they need.
-fn shown(value: f64, digits: usize) -> String {
-    if value != 0.0 && value.abs() < 1e-3 {
+/// A number on an axis of this length, with as many digits as its neighbours need to differ.
+fn shown(value: f64, span: f64) -> String {
+    if span < 0.003 && value != 0.0 {
         return format!("{value:.0e}");
     }
+    let digits = match span {
+        20.0.. => 0,
+        2.0.. => 1,
+        _ => (1.0 - span.log10()).ceil().clamp(1.0, 6.0) as usize,
+    };
     let text = format!("{value:.digits$}");
     // No "-0.0".
     if text.trim_start_matches('-').chars().all(|c| matches!(c, '0' | '.')) { "0".to_owned() } else { text }
@@ -427,6 +426,7 @@ mod tests {
 
     #[test]
     fn numbers_on_axes_are_short() {
-        assert_eq!([shown(-0.0001, 1), shown(0.25, 2), shown(-0.0, 1), shown(500.0, 0)], ["-1e-4", "0.25", "0", "500"]);
+        let all = [shown(5e-4, 0.001), shown(0.25, 0.9), shown(-0.0, 2.0), shown(500.0, 1e3), shown(0.01, 0.02)];
+        assert_eq!(all, ["5e-4", "0.25", "0", "500", "0.010"]);
     }
 }

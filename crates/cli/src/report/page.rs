@@ -39,7 +39,7 @@ pub enum Block {
     Figure(Box<Figure>),
 }
 
-/// A table. Cells that are numbers stand to the right; the words "met" and "missed" are coloured.
+/// A table. Columns of numbers stand to the right; the words "met" and "missed" are coloured.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Sheet {
     /// Stands above it.
@@ -116,12 +116,13 @@ impl Block {
 impl Sheet {
     fn html(&self, out: &mut String) {
         let short = if self.rows.len() <= 14 { " short" } else { "" };
+        // A column of numbers stands to the right.
+        let numbers = |column: usize| self.rows.iter().all(|row| row.get(column).is_some_and(|cell| is_number(cell)));
         *out += &format!("<div class=\"sheet{short}\"><table>\n<caption>{}</caption>\n", escaped(&self.caption));
         if !self.head.is_empty() {
             *out += "<thead><tr>";
             for (column, cell) in self.head.iter().enumerate() {
-                let numbers = self.rows.first().and_then(|row| row.get(column)).is_some_and(|cell| is_number(cell));
-                let class = if numbers { " class=\"n\"" } else { "" };
+                let class = if numbers(column) { " class=\"n\"" } else { "" };
                 *out += &format!("<th scope=\"col\"{class}>{}</th>", escaped(cell));
             }
             *out += "</tr></thead>\n";
@@ -129,11 +130,11 @@ impl Sheet {
         *out += "<tbody>\n";
         for row in &self.rows {
             *out += "<tr>";
-            for cell in row {
+            for (column, cell) in row.iter().enumerate() {
                 let class = match cell.as_str() {
                     "met" => " class=\"passed\"",
                     "missed" => " class=\"failed\"",
-                    cell if is_number(cell) => " class=\"n\"",
+                    _ if numbers(column) => " class=\"n\"",
                     _ => "",
                 };
                 *out += &format!("<td{class}>{}</td>", escaped(cell));
@@ -162,7 +163,7 @@ impl Figure {
     }
 }
 
-/// Whether a cell should stand to the right.
+/// Whether a cell is a number, with or without its spread or a percent sign, or a dash in the place of one.
 fn is_number(cell: &str) -> bool {
     let number = cell.trim_end_matches([' ', '%']).split(" \u{b1} ").next().unwrap_or(cell);
     !number.is_empty() && number.parse::<f64>().is_ok() || cell == "\u{2013}"

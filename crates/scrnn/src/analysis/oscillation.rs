@@ -68,7 +68,7 @@ mod tests {
         let wave: Vec<f64> =
             (0..1000).map(|k| 0.8 * (std::f64::consts::TAU * f64::from(k) / 24.0 - 1.0).sin()).collect();
         let found = Oscillation::of([wave.as_slice()], 0.0, 0.2).unwrap();
-        assert_eq!(found.cycles, 40);
+        assert_eq!(found.cycles, 41);
         assert!((found.period - 24.0).abs() < 1e-9 && found.period_deviation < 1e-9, "{found:?}");
         assert!((found.amplitude - 0.8).abs() < 0.01 && found.amplitude_deviation < 1e-9, "{found:?}");
     }

@@ -184,7 +184,7 @@ fn variances(findings: &Findings, material: &Material) -> Section {
                 Series::line("predicted variance of channel 1", Tone::Ours, (from..to).map(points).collect()),
                 Series::line("truth", Tone::Truth, truth),
             ];
-            let panel = Panel::spanning(pattern.number.to_string(), series).from_zero();
+            let panel = Panel::spanning(pattern.number.to_string(), series).with_zero();
             Panel { x: (from as f64, to as f64), y: (0.0, panel.y.1.max(1.6 * pattern.true_variance)), ..panel }
         })
         .collect();

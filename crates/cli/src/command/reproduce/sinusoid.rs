@@ -178,7 +178,7 @@ impl Study for Sinusoid {
         let panels = vec![
             wave("training data", Tone::Data, over_time(&material.data, 0, 0, to)),
             wave("output of the network on its own", Tone::Ours, closed(&material.closed.sample)),
-            Panel::spanning("variance", variances).from_zero(),
+            Panel::spanning("variance", variances).with_zero(),
         ];
         let chart = Chart { columns: 1, aspect: 3.6, x_label: "step".into(), y_label: String::new(), panels };
         let figure = Figure {
