@@ -4,6 +4,8 @@
 mod experiments;
 #[path = "cli/refusals.rs"]
 mod refusals;
+#[path = "cli/reproducing.rs"]
+mod reproducing;
 #[path = "cli/resuming.rs"]
 mod resuming;
 #[path = "cli/strangers.rs"]

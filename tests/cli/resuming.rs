@@ -26,7 +26,7 @@ fn start(place: &Place, line: &str) -> Child {
         .unwrap()
 }
 
-fn wait_for(place: &Place, name: &str) {
+pub fn wait_for(place: &Place, name: &str) {
     let begun = Instant::now();
     while !place.path(name).exists() {
         assert!(begun.elapsed() < Duration::from_secs(30), "{name} does not appear");

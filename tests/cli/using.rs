@@ -181,7 +181,8 @@ fn the_schema_names_every_key_and_completions_every_command() {
 fn help_teaches_by_examples() {
     let place = Place::new();
     assert!(place.ok("--help").contains("Exit codes"));
-    for command in ["data", "train", "generate", "recognize", "inspect", "completions", "schema"] {
+    for command in ["data", "train", "generate", "recognize", "reproduce", "report", "inspect", "completions", "schema"]
+    {
         let help = place.ok(&format!("{command} --help"));
         assert!(help.contains("Example") && help.contains(&format!("scrnn {command}")), "{help}");
     }

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use clap::{Args, Parser, Subcommand};
 use scrnn::engine::{Engine, InstructionSet};
 
-use crate::command::{completions, data, generate, inspect, recognize, train};
+use crate::command::{completions, data, generate, inspect, recognize, report, reproduce, train};
 use crate::failure::Result;
 
 static VERSION: LazyLock<String> =
@@ -20,10 +20,14 @@ A first session, on the thesis' noisy sine wave:
   scrnn generate runs/sinusoid_fast --out wave.csv      lets the network run on its own
   scrnn inspect runs/sinusoid_fast                      what is in the run folder
 
+The thesis' chapter 3, with a page to look at:
+  scrnn reproduce sinusoid                              trains, evaluates, compares with the thesis
+
 And on data of your own:
   scrnn inspect mine.csv                                what scrnn makes of the file
   scrnn train mine.toml                                 an experiment with files = [\"mine.csv\"]
   scrnn recognize runs/mine new.csv                     which learned sequence is this?
+  scrnn report runs/mine                                the run as a page
 
 Results go to stdout, progress and messages to stderr. Sequences count from 1, as in the thesis.
 
@@ -88,6 +92,8 @@ pub enum Command {
     Train(train::Arguments),
     Generate(generate::Arguments),
     Recognize(recognize::Arguments),
+    Reproduce(reproduce::Arguments),
+    Report(report::Arguments),
     Inspect(inspect::Arguments),
     /// Print the JSON schema of the experiment file
     ///

@@ -6,6 +6,7 @@
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::Write as _;
+use std::path::Path;
 
 use scrnn::learning::EpochReport;
 
@@ -13,6 +14,31 @@ use crate::failure::{Failure, Result};
 use crate::run_folder::{HISTORY, RunFolder};
 
 const HEADER: &str = "epoch,nll,mse,rate_shared,rate_initial,gradient_norm,seconds\n";
+
+/// What a row says that learning curves are drawn from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// The number of updates made before.
+    pub epoch: u64,
+    /// Nats per step and channel, in scaled units; none without variance units.
+    pub nll: Option<f64>,
+    /// Mean squared error per step and channel, in scaled units.
+    pub mse: f64,
+}
+
+/// The rows of a history file, up to the first that is not whole.
+pub fn read(path: &Path) -> Result<Vec<Row>> {
+    let text = std::fs::read_to_string(path).map_err(|error| Failure::disk("read", path, error))?;
+    let row = |line: &str| {
+        let mut fields = line.split(',');
+        let epoch = fields.next()?.parse().ok()?;
+        let nll = fields.next()?;
+        let mse = fields.next()?.parse().ok()?;
+        Some(Row { epoch, nll: nll.parse().ok(), mse })
+    };
+    let (kept, _) = rows_up_to(&text, u64::MAX);
+    Ok(kept.lines().map_while(row).collect())
+}
 
 /// The history that is being written.
 #[derive(Debug)]
@@ -99,6 +125,16 @@ fn rows_up_to(text: &str, epoch: u64) -> (String, Option<(u64, f64)>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn learning_curves_are_read_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(HISTORY);
+        let text = format!("{HEADER}0,1.5,0.25,1e-7,1e-4,2.0,0.000\n5,,0.125,1e-7,1e-4,2.0,0.100\n9,0.5,0.");
+        std::fs::write(&path, text).unwrap();
+        let rows = [Row { epoch: 0, nll: Some(1.5), mse: 0.25 }, Row { epoch: 5, nll: None, mse: 0.125 }];
+        assert_eq!(read(&path).unwrap(), rows);
+    }
 
     #[test]
     fn rows_beyond_the_checkpoint_and_half_lines_are_cut_off() {

@@ -1,6 +1,7 @@
 //! The `scrnn` program: parse, dispatch, and map the result to an exit code.
 
 mod args;
+mod assessment;
 mod command;
 mod experiment;
 mod failure;
@@ -9,6 +10,7 @@ mod history;
 mod notes;
 mod output;
 mod progress;
+mod report;
 mod run_folder;
 mod source;
 mod table;
@@ -29,6 +31,8 @@ fn main() -> ExitCode {
         Command::Train(arguments) => command::train::run(&arguments, &shared),
         Command::Generate(arguments) => command::generate::run(&arguments, &shared),
         Command::Recognize(arguments) => command::recognize::run(&arguments, &shared),
+        Command::Reproduce(arguments) => command::reproduce::run(&arguments, &shared),
+        Command::Report(arguments) => command::report::run(&arguments, &shared),
         Command::Inspect(arguments) => command::inspect::run(&arguments, &shared),
         Command::Schema => command::schema::run(),
         Command::Completions(arguments) => command::completions::run(&arguments),

@@ -3,7 +3,7 @@
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use scrnn::learning::EpochReport;
 
 /// Between two lines off a terminal.
@@ -14,6 +14,7 @@ const BETWEEN_UPDATES: Duration = Duration::from_millis(100);
 /// Shows the epochs as they pass.
 #[derive(Debug)]
 pub struct Progress {
+    label: String,
     display: Display,
     total: u64,
     start: Option<(u64, Instant)>,
@@ -30,16 +31,21 @@ enum Display {
 impl Progress {
     /// For a training of `total` epochs.
     pub fn new(total: u64, quiet: bool) -> Self {
+        Self::labelled("", total, quiet, &MultiProgress::new())
+    }
+
+    /// For one of several trainings that go on side by side; `label` goes before what is shown of it.
+    pub fn labelled(label: &str, total: u64, quiet: bool, all: &MultiProgress) -> Self {
         let display = if quiet {
             Display::Quiet
         } else if std::io::stderr().is_terminal() {
-            let style = ProgressStyle::with_template("{bar:24} {human_pos}/{human_len} epochs  {msg}")
+            let style = ProgressStyle::with_template("{prefix}{bar:24} {human_pos}/{human_len} epochs  {msg}")
                 .unwrap_or_else(|_| ProgressStyle::default_bar());
-            Display::Bar(ProgressBar::new(total).with_style(style))
+            Display::Bar(all.add(ProgressBar::new(total).with_style(style).with_prefix(label.to_owned())))
         } else {
             Display::Lines
         };
-        Self { display, total, start: None, shown: Instant::now() }
+        Self { label: label.to_owned(), display, total, start: None, shown: Instant::now() }
     }
 
     /// Shows where training stands, if it is time to.
@@ -67,7 +73,7 @@ impl Progress {
         }
         match &self.display {
             Display::Quiet => {}
-            Display::Lines => eprintln!("epoch {}/{}  {message}", report.epoch, self.total),
+            Display::Lines => eprintln!("{}epoch {}/{}  {message}", self.label, report.epoch, self.total),
             Display::Bar(bar) => {
                 bar.set_position(report.epoch);
                 bar.set_message(message);

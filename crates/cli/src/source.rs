@@ -1,7 +1,7 @@
 //! Where an experiment's sequences come from: a task, which knows the truth, or files.
 
 use scrnn::dataset::Dataset;
-use scrnn::tasks::{Task, limit_cycle, lissajous, sinusoid};
+use scrnn::tasks::{Task, limit_cycle, lissajous, patterns, sinusoid};
 use sha2::{Digest, Sha256};
 
 use crate::experiment::{Data, TaskName};
@@ -74,6 +74,7 @@ pub fn load(data: &Data) -> Result<Source> {
 pub fn make(task: TaskName, (sequences, steps): (usize, usize), seed: u64) -> Result<Task> {
     Ok(match task {
         TaskName::Lissajous => lissajous::generate(&lissajous::Options { sequences, steps }, seed)?,
+        TaskName::Patterns => patterns::generate(&patterns::Options { sequences, steps }, seed)?,
         TaskName::Sinusoid => sinusoid::generate(&sinusoid::Options { sequences, steps }, seed)?,
         TaskName::LimitCycle => limit_cycle::generate(&limit_cycle::Options { sequences, steps }, seed)?.task,
     })

@@ -35,6 +35,15 @@ pub fn gaussian_entropy(variance: f64) -> f64 {
     0.5 * (2.0 * std::f64::consts::PI * std::f64::consts::E * variance).ln()
 }
 
+/// Mean and standard deviation (divided by n - 1; 0 for a single value). NaN for an empty list.
+#[must_use]
+pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    (mean, if values.len() > 1 { (squares / (n - 1.0)).sqrt() } else { squares })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -45,6 +54,13 @@ mod tests {
         assert!((correlation(&a, &[3.0, 5.0, 9.0]).unwrap() - 1.0).abs() < 1e-15);
         assert!((correlation(&a, &[-3.0, -5.0, -9.0]).unwrap() + 1.0).abs() < 1e-15);
         assert_eq!((correlation(&a, &[2.0; 3]), correlation(&[], &[])), (None, None));
+    }
+
+    #[test]
+    fn the_deviation_of_a_sample_is_unbiased_in_its_square() {
+        assert_eq!(mean_and_deviation(&[1.0, 3.0]), (2.0, 2.0_f64.sqrt()));
+        assert_eq!(mean_and_deviation(&[5.0]), (5.0, 0.0));
+        assert!(mean_and_deviation(&[]).0.is_nan());
     }
 
     #[test]

@@ -87,6 +87,9 @@ pub struct Generated {
     pub contexts: Vec<f64>,
 }
 
+/// Sets generation's noise apart: data that were made from the same seed must not come back as what a network draws.
+const DOMAIN: u64 = 0x6765_6E65_7261_7465;
+
 /// Columns that one thread steps at a time.
 const COLUMNS: usize = 6;
 
@@ -163,7 +166,7 @@ impl WithSimd for Generate<'_> {
         let mut random = Vec::with_capacity(columns);
         for (column, start) in starts.iter().enumerate() {
             stepper.start(packed, column, start.initial_state);
-            let mut own = ChaCha8Rng::seed_from_u64(options.seed);
+            let mut own = ChaCha8Rng::seed_from_u64(options.seed ^ DOMAIN);
             own.set_stream(stream + column as u64);
             random.push(own);
             out[column].mean.reserve_exact(options.steps * n_x);

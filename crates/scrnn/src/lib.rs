@@ -89,7 +89,8 @@
 //! | [`learning`] | momentum ascent, its adaptive rate, Adam; the loop with its observer | 2.6.2, D.1 |
 //! | [`generation`], [`recognition`] | open, closed and mixed loop; the search for u_0 | 2.8, 2.9 |
 //! | [`error_regression`] | recognition while samples arrive, over a sliding window | 2.10.2 |
-//! | [`evaluation`], [`checkpoint`] | measures; a trained network as bytes | 3.2.5 |
+//! | [`evaluation`], [`analysis`] | errors and bounds; components, clusters, calibration, simple models | 3.2.4-3.2.6 |
+//! | [`checkpoint`] | a trained network as bytes | |
 //! | [`error`] | what can be wrong with a request | |
 //!
 //! # What holds everywhere
@@ -101,6 +102,7 @@
 //! - A training that leaves the finite numbers is no error but an [`Outcome`](learning::Outcome): it is rolled back to the
 //!   last good epoch and says where it happened.
 
+pub mod analysis;
 pub mod checkpoint;
 pub mod dataset;
 pub mod engine;

@@ -5,5 +5,7 @@ pub mod data;
 pub mod generate;
 pub mod inspect;
 pub mod recognize;
+pub mod report;
+pub mod reproduce;
 pub mod schema;
 pub mod train;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use scrnn::dataset::Dataset;
 use scrnn::learning::{self, Optimiser, Plan};
 use scrnn::scaling::Scaling;
-use scrnn::tasks::{limit_cycle, lissajous, sinusoid};
+use scrnn::tasks::{limit_cycle, lissajous, patterns, sinusoid};
 use scrnn::topology::{self, Prediction, Topology};
 
 use super::{
@@ -20,6 +20,10 @@ impl TaskName {
         match self {
             Self::Lissajous => {
                 let lissajous::Options { sequences, steps } = lissajous::Options::default();
+                (sequences, steps)
+            }
+            Self::Patterns => {
+                let patterns::Options { sequences, steps } = patterns::Options::default();
                 (sequences, steps)
             }
             Self::Sinusoid => {

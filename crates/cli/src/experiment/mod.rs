@@ -1,6 +1,6 @@
 //! The experiment file: everything that decides what a training comes to.
 //!
-//! The types here are the file's format. [`read`] turns a file and `--set` options into an [`Experiment`], checked, with
+//! The types here are the file's format. [`read()`] turns a file and `--set` options into an [`Experiment`], checked, with
 //! every default filled in; the run folder keeps it in that form.
 
 mod checks;
@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 pub use difference::{Difference, differences};
 pub use overrides::Override;
-pub use reading::read;
+pub use reading::{read, read_text};
 
 /// What to learn, with which network and how.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -75,6 +75,8 @@ pub struct Data {
 pub enum TaskName {
     /// Twelve Lissajous curves, each with noise of its own variance (3.1-3.3, C.1-C.12)
     Lissajous,
+    /// The Lissajous curves in twelve variants each, 144 patterns in all (6.2.3)
+    Patterns,
     /// One sine wave with noise whose variance changes over time (3.6, 3.7)
     Sinusoid,
     /// A random dynamical system with noise whose variance depends on its state (3.8-3.12)

@@ -17,10 +17,17 @@ use crate::failure::{Failure, Result};
 /// [`Failure::Disk`]; [`Failure::Input`] with the line of the file, or the option, that is wrong.
 pub fn read(path: &Path, overrides: &[Override]) -> Result<Experiment> {
     let text = std::fs::read_to_string(path).map_err(|error| Failure::disk("read", path, error))?;
-    let name = path.display().to_string();
-    let mut experiment: Experiment = toml::from_str(&text).map_err(|error| bad_toml(&error, (&name, &text)))?;
+    read_text(&path.display().to_string(), &text, overrides)
+}
+
+/// Reads the experiment in `text`, which stands in a file called `name`, and applies `overrides` as [`read`] does.
+///
+/// # Errors
+/// [`Failure::Input`].
+pub fn read_text(name: &str, text: &str, overrides: &[Override]) -> Result<Experiment> {
+    let mut experiment: Experiment = toml::from_str(text).map_err(|error| bad_toml(&error, (name, text)))?;
     if !overrides.is_empty() {
-        let mut table: Table = toml::from_str(&text).map_err(|error| bad_toml(&error, (&name, &text)))?;
+        let mut table: Table = toml::from_str(text).map_err(|error| bad_toml(&error, (name, text)))?;
         for change in overrides {
             change.apply(&mut table).map_err(|message| in_option(change, message, None))?;
             experiment = Experiment::deserialize(table.clone()).map_err(|error| {
@@ -30,7 +37,7 @@ pub fn read(path: &Path, overrides: &[Override]) -> Result<Experiment> {
         }
         no_effect(&experiment, overrides)?;
     }
-    checks::check(&experiment).map_err(|complaint| place(complaint, overrides, (&name, &text)))?;
+    checks::check(&experiment).map_err(|complaint| place(complaint, overrides, (name, text)))?;
     Ok(experiment)
 }
 

@@ -84,7 +84,7 @@ fn exists(s: usize) -> Result<()> {
 /// ```text
 /// (y_1, y_2) = (+-Y_i, +-Y_j)                                  (C.1) - (C.12)
 /// ```
-fn curve(s: usize, t: usize) -> [f64; 2] {
+pub(super) fn curve(s: usize, t: usize) -> [f64; 2] {
     let waves = waves(t);
     CURVES[s].map(|wave| f64::from(wave.signum()) * waves[usize::from(wave.unsigned_abs()) - 1])
 }
@@ -92,7 +92,7 @@ fn curve(s: usize, t: usize) -> [f64; 2] {
 /// ```text
 /// sigma = 0.01, 0.03, 0.05, 0.07, 0.01, ...                    (3.3)
 /// ```
-fn deviation(s: usize) -> f64 {
+pub(super) fn deviation(s: usize) -> f64 {
     [0.01, 0.03, 0.05, 0.07][s % 4]
 }
 

@@ -1,8 +1,9 @@
-//! The training data of chapter 3, seeded, with the truth beside the samples.
+//! The training data of chapter 3 and 6.2.3, seeded, with the truth beside the samples.
 //!
 //! | module | data | noise | thesis |
 //! |---|---|---|---|
 //! | [`lissajous`] | twelve closed curves on two channels | constant, another level for every curve | 3.2, C.1 |
+//! | [`patterns`] | 144 of them, turned and shrunk | the same levels | 6.2.3 |
 //! | [`sinusoid`] | one sine wave | grows and falls within each period | 3.3 |
 //! | [`limit_cycle`] | an oscillator that noise drives | depends on the last sample | 3.4 |
 //!
@@ -18,6 +19,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 pub mod limit_cycle;
 pub mod lissajous;
+pub mod patterns;
 pub mod sinusoid;
 
 /// Most samples of one data set: a slip of the finger should not fill the memory.

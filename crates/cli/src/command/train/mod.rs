@@ -3,30 +3,24 @@
 mod interrupt;
 mod recorder;
 mod resume;
+mod training;
 mod verdict;
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use scrnn::checkpoint::Checkpoint;
-use scrnn::dataset::Dataset;
-use scrnn::initialization::initialize;
-use scrnn::learning::{Learner, Outcome};
-use scrnn::network::Network;
+use scrnn::learning::Outcome;
 
 use crate::args::Shared;
-use crate::experiment::{self, Experiment, Override};
+use crate::experiment::{self, Override};
 use crate::failure::{Ending, Failure, Result};
-use crate::history::History;
-use crate::notes::{DataNotes, Notes, learned_part};
 use crate::output;
 use crate::progress::Progress;
-use crate::run_folder::{BEST, CHECKPOINT, EXPERIMENT, HISTORY, RunFolder};
-use crate::source;
-use crate::trained::read_checkpoint;
-use interrupt::Interrupt;
-use recorder::{Record, Recorder};
+use crate::run_folder::{BEST, CHECKPOINT, EXPERIMENT};
 use verdict::Verdict;
+
+pub use interrupt::Interrupt;
+pub use training::{Found, Training, train};
 
 /// Train a network as an experiment file says
 ///
@@ -107,87 +101,37 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     let path = folder.map(Path::to_owned).or_else(|| arguments.out.clone()).unwrap_or_else(default_folder);
 
     let engine = shared.engine()?;
-    let source = source::load(&experiment.data)?;
-    let topology = experiment.topology(source.data.channels().len())?;
-    source.data.check_for(&topology)?;
-    let scaling = experiment.data.scaling_for(&source.data)?;
-    let scaled = scaling.apply(&source.data);
-    warn_out_of_reach(&scaled, shared);
-
-    let (network, initial_states) = initialize(&topology, scaled.sequences().len(), experiment.seed);
-    let mut learner = Learner::new(network, initial_states, &scaled, experiment.plan(), &engine)?;
-    let notes = Notes {
-        experiment: learned_part(&experiment),
-        data: DataNotes {
-            digest: source::digest(&source.data),
-            lengths: source.data.sequences().iter().map(|sequence| sequence.len()).collect(),
-        },
-        score: None,
-        best: None,
-    };
-
-    let run = RunFolder::open(&path)?;
-    let found = run.file(CHECKPOINT).exists();
-    if found && !arguments.resume && !arguments.overwrite {
-        return Err(Failure::refused(
-            format!("{} already holds a run", path.display()),
-            "--resume goes on with it, --overwrite throws it away, --out RUN writes elsewhere",
-        ));
-    }
-    let (notes, history) = if found && arguments.resume {
-        let checkpoint = read_checkpoint(&run.file(CHECKPOINT))?;
-        let notes = resume::check(&checkpoint, notes, &experiment, &path)?;
-        learner = go_on(checkpoint, &scaled, &experiment, &engine)?;
-        shared.say(format_args!("going on with {} at epoch {}", path.display(), learner.epoch()));
-        write_experiment(&run, &experiment)?;
-        (notes, History::go_on(&run, learner.epoch())?)
-    } else {
-        if arguments.resume {
-            shared.say(format_args!("{} holds no checkpoint: starting from epoch 0", path.display()));
-        }
-        // In this order: a kill in between leaves a folder without a run rather than parts of two.
-        for name in [CHECKPOINT, BEST, HISTORY] {
-            run.remove(name)?;
-        }
-        write_experiment(&run, &experiment)?;
-        (notes, History::start(&run)?)
-    };
-    let record = Record {
-        scaling: scaling.clone(),
-        channels: scaled.channels().to_vec(),
-        sequences: scaled.sequences().iter().map(|sequence| sequence.name.clone()).collect(),
-        first_inputs: first_inputs(&scaled, topology.delay()),
-    };
-
     let interrupt = Interrupt::listen();
     let progress = Progress::new(experiment.training.epochs, shared.quiet);
-    let mut recorder = Recorder::new(&run, record, notes, history, progress, &experiment, &interrupt);
-    if found && arguments.resume {
-        recorder.take_up_best(&learner);
+    let found = if arguments.resume {
+        if !path.join(CHECKPOINT).exists() {
+            shared.say(format_args!("{} holds no checkpoint: starting from epoch 0", path.display()));
+        }
+        Found::GoOn
+    } else if arguments.overwrite {
+        Found::Overwrite
     } else {
-        recorder.save(&learner)?;
-    }
-    let outcome = learner.run(&mut recorder);
-    recorder.finish(&learner, &outcome)?;
-
-    let verdict = Verdict::new(&recorder, &learner, &source, &scaling, &outcome, &engine)?;
+        Found::Refuse
+    };
+    let training = train(&experiment, (&path, found), (&engine, &interrupt), progress, shared)?;
+    let verdict = Verdict::new(&training, &engine)?;
     if arguments.json {
         output::print_json(&verdict)?;
     } else {
         output::print(&verdict.to_string())?;
     }
-    Ok(ending(&outcome, &learner, &path, shared))
+    Ok(ending(&training, &path, shared))
 }
 
 /// Tells what to do about an end before the last epoch.
-fn ending(outcome: &Outcome, learner: &Learner, path: &Path, shared: &Shared) -> Ending {
+fn ending(training: &Training, path: &Path, shared: &Shared) -> Ending {
     let folder = path.display();
-    match outcome {
+    match &training.outcome {
         Outcome::Finished => Ending::Done,
         Outcome::Stopped => {
             shared.say(format_args!(
                 "interrupted: epoch {} is saved. To go on:\n  scrnn train {folder} --resume",
-                learner.epoch()
+                training.learner.epoch()
             ));
             Ending::Interrupted
         }
@@ -197,48 +141,6 @@ fn ending(outcome: &Outcome, learner: &Learner, path: &Path, shared: &Shared) ->
                  Train anew with a smaller rate, a variance_floor above 0 or, with adam, a smaller clip_norm."
             );
             Ending::Diverged
-        }
-    }
-}
-
-/// A learner that stands where the checkpoint stands.
-fn go_on(
-    checkpoint: Checkpoint,
-    scaled: &Dataset,
-    experiment: &Experiment,
-    engine: &scrnn::engine::Engine,
-) -> Result<Learner> {
-    let Checkpoint { topology, parameters, initial_states, epoch, optimiser, .. } = checkpoint;
-    let network = Network { topology, parameters };
-    let mut learner = Learner::new(network, initial_states, scaled, experiment.plan(), engine)?;
-    learner.restore(epoch, &optimiser)?;
-    Ok(learner)
-}
-
-fn write_experiment(run: &RunFolder, experiment: &Experiment) -> Result<()> {
-    let text = toml::to_string(experiment).expect("the experiment came from such a file");
-    let head = "# Written by scrnn train: the experiment with every value explicit.\n";
-    run.write(EXPERIMENT, format!("{head}{text}").as_bytes())
-}
-
-/// The first xi samples of each sequence: what a closed loop starts from.
-fn first_inputs(scaled: &Dataset, delay: usize) -> Vec<f64> {
-    let values = delay * scaled.channels().len();
-    scaled.sequences().iter().flat_map(|sequence| &sequence.values()[..values]).copied().collect()
-}
-
-/// The mean units reach from -1 to 1: samples beyond cannot be predicted.
-fn warn_out_of_reach(scaled: &Dataset, shared: &Shared) {
-    for (i, name) in scaled.channels().iter().enumerate() {
-        let samples =
-            scaled.sequences().iter().flat_map(|sequence| sequence.values().chunks_exact(scaled.channels().len()));
-        let beyond = samples.map(|sample| sample[i]).filter(|value| value.abs() >= 1.0).count();
-        if beyond > 0 {
-            let total = scaled.total_samples();
-            shared.say(format_args!(
-                "warning: {beyond} of {total} samples of channel {name} lie outside of -1 to 1, where the network's \
-                 predictions end; `scaling = \"fit\"` in [data] brings them inside"
-            ));
         }
     }
 }

@@ -132,11 +132,6 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// The run folder.
-    pub fn run(&self) -> &RunFolder {
-        self.run
-    }
-
     /// How the network did at `epoch`, if that is the last one that was evaluated.
     pub fn score_of(&self, epoch: u64) -> Option<Score> {
         self.notes.score.filter(|score| score.epoch == epoch)

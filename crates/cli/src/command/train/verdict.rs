@@ -5,14 +5,12 @@ use std::fmt;
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::engine::Engine;
 use scrnn::evaluation::gaussian_entropy;
-use scrnn::learning::{Divergence, Learner, Outcome};
-use scrnn::scaling::Scaling;
+use scrnn::learning::{Divergence, Outcome};
 use serde::Serialize;
 
-use super::recorder::Recorder;
+use super::training::Training;
 use crate::failure::Result;
 use crate::notes::Score;
-use crate::source::Source;
 use crate::truth::{self, Comparison};
 
 /// The result of a training.
@@ -53,17 +51,10 @@ struct Place {
 }
 
 impl Verdict {
-    /// Judges the network that the learner holds.
-    pub fn new(
-        recorder: &Recorder<'_>,
-        learner: &Learner,
-        source: &Source,
-        scaling: &Scaling,
-        outcome: &Outcome,
-        engine: &Engine,
-    ) -> Result<Self> {
+    /// Judges the network that the training ended with.
+    pub fn new(training: &Training, engine: &Engine) -> Result<Self> {
+        let Training { run, outcome, learner, source, scaling, score, best, seconds } = training;
         let topology = &learner.network().topology;
-        let score = recorder.score_of(learner.epoch());
         let truth = match (outcome, &source.truth) {
             (Outcome::Finished, Some(truth)) if topology.has_variance() => {
                 truth::compare((learner.network(), learner.initial_states()), (&source.data, truth, scaling), engine)?
@@ -71,7 +62,7 @@ impl Verdict {
             _ => None,
         };
         Ok(Self {
-            run: recorder.run().path().display().to_string(),
+            run: run.clone(),
             outcome: match outcome {
                 Outcome::Finished => "finished",
                 Outcome::Stopped => "interrupted",
@@ -81,13 +72,13 @@ impl Verdict {
             nll: score.and_then(|score| score.nll),
             mse: score.map(|score| score.mse),
             constant_model: ConstantModel::of(&scaling.apply(&source.data), topology.delay())?,
-            best: recorder.best(),
+            best: *best,
             truth,
             divergence: match outcome {
                 Outcome::Diverged(divergence) => Some(Place::of(divergence)),
                 _ => None,
             },
-            seconds: recorder.seconds(),
+            seconds: *seconds,
             threads: engine.threads(),
             instruction_set: engine.instruction_set().to_string(),
         })

@@ -1,0 +1,105 @@
+//! The experiments that ship, as they lie in assets/experiments: one place holds the settings.
+
+use clap::ValueEnum;
+use serde::Serialize;
+
+use crate::experiment::{self, Experiment, Override};
+use crate::failure::{Failure, Result};
+
+/// Which settings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Preset {
+    /// The thesis' optimiser and number of epochs
+    Thesis,
+    /// What gets there soonest
+    Fast,
+}
+
+/// One network of a study.
+#[derive(Debug, Clone, Copy)]
+pub struct Kind {
+    /// What the thesis calls it.
+    pub name: &'static str,
+    /// Goes behind the seed in the name of its run folder.
+    pub suffix: &'static str,
+    /// File names and texts of its experiment, thesis and fast.
+    pub presets: [(&'static str, &'static str); 2],
+}
+
+macro_rules! asset {
+    ($name:literal) => {
+        (
+            concat!("assets/experiments/", $name),
+            include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/experiments/", $name)),
+        )
+    };
+}
+
+/// The S-CTRNN of the Lissajous curves.
+pub const LISSAJOUS: Kind =
+    Kind { name: "S-CTRNN", suffix: "", presets: [asset!("lissajous.toml"), asset!("lissajous_fast.toml")] };
+/// The CTRNN that it is compared with.
+pub const LISSAJOUS_CTRNN: Kind = Kind {
+    name: "CTRNN",
+    suffix: "-ctrnn",
+    presets: [asset!("lissajous_ctrnn.toml"), asset!("lissajous_ctrnn_fast.toml")],
+};
+/// The S-CTRNN of 144 patterns.
+pub const PATTERNS: Kind =
+    Kind { name: "S-CTRNN", suffix: "", presets: [asset!("patterns.toml"), asset!("patterns_fast.toml")] };
+/// The S-CTRNN of the sine wave.
+pub const SINUSOID: Kind =
+    Kind { name: "S-CTRNN", suffix: "", presets: [asset!("sinusoid.toml"), asset!("sinusoid_fast.toml")] };
+/// The S-CTRNN of the noise-driven oscillator.
+pub const LIMIT_CYCLE: Kind =
+    Kind { name: "S-CTRNN", suffix: "", presets: [asset!("limit_cycle.toml"), asset!("limit_cycle_fast.toml")] };
+
+impl Kind {
+    /// The resolved experiment. `seed` is that of the weights and of the data's noise alike.
+    pub fn experiment(&self, preset: Preset, seed: u64, epochs: Option<u64>) -> Result<Experiment> {
+        let (name, text) = self.presets[preset as usize];
+        let mut changes = vec![("--seed", "seed", seed), ("--seed", "data.seed", seed)];
+        changes.extend(epochs.map(|epochs| ("--epochs", "training.epochs", epochs)));
+        let overrides: std::result::Result<Vec<Override>, String> =
+            changes.into_iter().map(|(option, key, value)| Override::shorthand(option, key, value)).collect();
+        let overrides = overrides.map_err(|message| Failure::input(message, ""))?;
+        experiment::read_text(name, text, &overrides)?.resolved(std::path::Path::new(""))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_preset_is_a_sound_experiment_on_unscaled_data() {
+        for kind in [LISSAJOUS, LISSAJOUS_CTRNN, PATTERNS, SINUSOID, LIMIT_CYCLE] {
+            for preset in [Preset::Thesis, Preset::Fast] {
+                let experiment = kind.experiment(preset, 3, Some(7)).unwrap();
+                assert_eq!((experiment.seed, experiment.data.seed, experiment.training.epochs), (3, Some(3), 7));
+                assert!(experiment.data.task.is_some(), "{}", experiment.name);
+                let scaling = serde_json::to_value(&experiment.data.scaling).unwrap();
+                assert_eq!(scaling, "none", "{}", experiment.name);
+                assert_eq!(experiment.network.variance, kind.name == "S-CTRNN");
+            }
+        }
+    }
+
+    #[test]
+    fn the_thesis_presets_have_the_settings_of_chapter_3() {
+        for (kind, units, epochs, variance, rate) in [
+            (LISSAJOUS, 60, 500_000, 100.0, 1e-4),
+            (LISSAJOUS_CTRNN, 60, 500_000, 100.0, 1e-2),
+            (SINUSOID, 10, 100_000, 1.0, 1e-4),
+            (LIMIT_CYCLE, 10, 500_000, 1.0, 1e-4),
+        ] {
+            let experiment = kind.experiment(Preset::Thesis, 1, None).unwrap();
+            let group = &experiment.network.groups[0];
+            assert_eq!((group.units, group.time_constant, experiment.training.epochs), (units, 2.0, epochs));
+            assert_eq!(experiment.network.initial_state_variance, variance);
+            let momentum = experiment.training.momentum.unwrap();
+            assert_eq!((momentum.rate, momentum.momentum), (rate, 0.9));
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! Seeds side by side on the cores. Threads change the time a seed takes, never its bits.
+
+use crate::failure::Result;
+
+/// How many seeds run at a time, and with how many threads each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Wave {
+    /// Seeds.
+    pub seeds: usize,
+    /// Threads for each of them.
+    pub threads: usize,
+}
+
+/// One seed for each core while there are enough of them; the last ones share the cores.
+pub fn waves(mut seeds: usize, cores: usize) -> Vec<Wave> {
+    let mut waves = Vec::new();
+    while seeds > 0 {
+        let now = seeds.min(cores.max(1));
+        waves.push(Wave { seeds: now, threads: (cores / now).max(1) });
+        seeds -= now;
+    }
+    waves
+}
+
+/// Calls `work` with each seed and its number of threads; results come in the order of the seeds. `None` says that the
+/// work was interrupted, and no further wave begins.
+pub fn side_by_side<T: Send>(
+    seeds: &[u64],
+    cores: usize,
+    work: impl Fn(u64, usize) -> Result<Option<T>> + Sync,
+) -> Result<Option<Vec<T>>> {
+    let mut results = Vec::with_capacity(seeds.len());
+    let mut rest = seeds;
+    for wave in waves(seeds.len(), cores) {
+        let (now, later) = rest.split_at(wave.seeds);
+        rest = later;
+        let done: Vec<Result<Option<T>>> = std::thread::scope(|scope| {
+            let work = &work;
+            let running: Vec<_> = now.iter().map(|&seed| scope.spawn(move || work(seed, wave.threads))).collect();
+            running
+                .into_iter()
+                .map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+                .collect()
+        });
+        for result in done {
+            match result? {
+                Some(result) => results.push(result),
+                None => return Ok(None),
+            }
+        }
+    }
+    Ok(Some(results))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cores_are_shared_out_among_the_seeds() {
+        let shape = |seeds, cores| waves(seeds, cores).iter().map(|w| (w.seeds, w.threads)).collect::<Vec<_>>();
+        assert_eq!(shape(1, 2), [(1, 2)]);
+        assert_eq!(shape(5, 2), [(2, 1), (2, 1), (1, 2)]);
+        assert_eq!(shape(3, 8), [(3, 2)]);
+        assert_eq!(shape(2, 1), [(1, 1), (1, 1)]);
+    }
+
+    #[test]
+    fn results_come_in_order_and_an_interruption_ends_all() {
+        let twice = |seed: u64, _| Ok(Some(2 * seed));
+        assert_eq!(side_by_side(&[3, 1, 2], 2, twice).unwrap(), Some(vec![6, 2, 4]));
+        let stop = |seed: u64, _| Ok(Some(seed).filter(|&seed| seed != 1));
+        assert_eq!(side_by_side(&[3, 1, 2], 2, stop).unwrap(), None);
+    }
+}

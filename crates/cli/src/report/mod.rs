@@ -1,0 +1,12 @@
+//! Pages to look at: text, tables and figures in one file that needs nothing else, no network, no script, no font.
+//!
+//! A [`Page`] is built of [`Section`]s; [`write`](write()) puts it into a folder, each figure also as an SVG file and its
+//! numbers as CSV.
+
+mod chart;
+mod page;
+mod writing;
+
+pub use chart::{Chart, Mark, Panel, Series, Tone};
+pub use page::{Block, Figure, Page, Section, Sheet};
+pub use writing::{FIGURES, PAGE, write};
