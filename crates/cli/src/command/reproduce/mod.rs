@@ -21,7 +21,7 @@ use scrnn::network::Network;
 
 use crate::args::Shared;
 use crate::command::train::{Found, Interrupt, Training, train};
-use crate::experiment::Experiment;
+use crate::experiment::{Experiment, Override};
 use crate::failure::{Ending, Result};
 use crate::history;
 use crate::output;
@@ -63,6 +63,9 @@ pub struct Arguments {
     /// Number of epochs, instead of the preset's
     #[arg(long, value_name = "N")]
     epochs: Option<u64>,
+    /// Any key of the S-CTRNN's experiment, e.g. --set training.adam.rate=1e-3; `data` counts for all networks
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<Override>,
     /// Train anew what is in the folder already
     #[arg(long)]
     overwrite: bool,
@@ -140,8 +143,10 @@ fn reproduce<S: Study>(study: &S, arguments: &Arguments, shared: &Shared) -> Res
         let engine = Engine::new(threads, shared.instruction_set())?;
         let clock = Instant::now();
         let mut networks = Vec::new();
-        for kind in study.networks() {
-            let experiment = kind.experiment(arguments.preset, seed, arguments.epochs)?;
+        for (index, kind) in study.networks().iter().enumerate() {
+            let concerns = |change: &&Override| index == 0 || change.path[0] == "data";
+            let changed: Vec<Override> = arguments.set.iter().filter(concerns).cloned().collect();
+            let experiment = kind.experiment(arguments.preset, seed, arguments.epochs, &changed)?;
             let run = format!("seed-{seed}{}", kind.suffix);
             let label = format!("seed {seed}, {}: ", kind.name);
             let progress = Progress::labelled(&label, experiment.training.epochs, shared.quiet, &bars);
@@ -239,6 +244,9 @@ fn command(arguments: &Arguments) -> String {
     line += &format!(" --seeds {} --seed {}", arguments.seeds, arguments.seed);
     if let Some(epochs) = arguments.epochs {
         line += &format!(" --epochs {epochs}");
+    }
+    for change in &arguments.set {
+        line += &format!(" {}", change.typed);
     }
     line
 }

@@ -56,14 +56,21 @@ pub const LIMIT_CYCLE: Kind =
     Kind { name: "S-CTRNN", suffix: "", presets: [asset!("limit_cycle.toml"), asset!("limit_cycle_fast.toml")] };
 
 impl Kind {
-    /// The resolved experiment. `seed` is that of the weights and of the data's noise alike.
-    pub fn experiment(&self, preset: Preset, seed: u64, epochs: Option<u64>) -> Result<Experiment> {
+    /// The resolved experiment with some of its keys changed. `seed` is that of the weights and of the data's noise alike.
+    pub fn experiment(
+        &self,
+        preset: Preset,
+        seed: u64,
+        epochs: Option<u64>,
+        changed: &[Override],
+    ) -> Result<Experiment> {
         let (name, text) = self.presets[preset as usize];
         let mut changes = vec![("--seed", "seed", seed), ("--seed", "data.seed", seed)];
         changes.extend(epochs.map(|epochs| ("--epochs", "training.epochs", epochs)));
         let overrides: std::result::Result<Vec<Override>, String> =
             changes.into_iter().map(|(option, key, value)| Override::shorthand(option, key, value)).collect();
-        let overrides = overrides.map_err(|message| Failure::input(message, ""))?;
+        let mut overrides = overrides.map_err(|message| Failure::input(message, ""))?;
+        overrides.extend_from_slice(changed);
         experiment::read_text(name, text, &overrides)?.resolved(std::path::Path::new(""))
     }
 }
@@ -76,7 +83,7 @@ mod tests {
     fn every_preset_is_a_sound_experiment_on_unscaled_data() {
         for kind in [LISSAJOUS, LISSAJOUS_CTRNN, PATTERNS, SINUSOID, LIMIT_CYCLE] {
             for preset in [Preset::Thesis, Preset::Fast] {
-                let experiment = kind.experiment(preset, 3, Some(7)).unwrap();
+                let experiment = kind.experiment(preset, 3, Some(7), &[]).unwrap();
                 assert_eq!((experiment.seed, experiment.data.seed, experiment.training.epochs), (3, Some(3), 7));
                 assert!(experiment.data.task.is_some(), "{}", experiment.name);
                 let scaling = serde_json::to_value(&experiment.data.scaling).unwrap();
@@ -94,7 +101,7 @@ mod tests {
             (SINUSOID, 10, 100_000, 1.0, 1e-4),
             (LIMIT_CYCLE, 10, 500_000, 1.0, 1e-4),
         ] {
-            let experiment = kind.experiment(Preset::Thesis, 1, None).unwrap();
+            let experiment = kind.experiment(Preset::Thesis, 1, None, &[]).unwrap();
             let group = &experiment.network.groups[0];
             assert_eq!((group.units, group.time_constant, experiment.training.epochs), (units, 2.0, epochs));
             assert_eq!(experiment.network.initial_state_variance, variance);
