@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! ln L_reg = sum_{t' = t-W+1..t} sum_i ln N(y-hat_t',i | y_t',i, v_t',i)                      (2.28)
-//! u_{t-W}  <- u_{t-W} + delta u,    delta u_n = alpha_reg d ln L_reg / d u_{t-W} + eta delta u_{n-1}   (2.19)
+//! u_{t-W}  <- u_{t-W} + delta u,    delta u_n = alpha_reg d ln L_reg / d u_{t-W} + eta delta u_{n-1}   (2.17), (2.18)
 //! ```
 //!
 //! Whenever a sample arrives, the last W steps are run again from the internal state before them, in the closed loop
@@ -10,7 +10,8 @@
 //! so is the prediction of the next sample. Only the groups whose initial state is learned are moved.
 //!
 //! The gradient is exact: it also runs through the means that the window feeds back to itself. Inputs of the window's
-//! first xi steps are the means predicted before it, or samples where there was no prediction yet.
+//! first xi steps are the means predicted before it, which stay as they were, or samples where there was no prediction
+//! yet.
 
 use aligned_vec::AVec;
 use pulp::{Simd, WithSimd};
@@ -120,6 +121,8 @@ pub struct Regression {
     pub ln_likelihood: [f64; 2],
     /// Sums of squared errors in the window, before and after.
     pub squared_error: [f64; 2],
+    /// Whether a step left the finite numbers: it was taken back, and no more were made.
+    pub diverged: bool,
 }
 
 /// A network that runs beside a stream of samples. Everything is allocated at the start.
@@ -166,6 +169,8 @@ pub struct ErrorRegression {
     moves: Vec<bool>,
     first: Vec<f64>,
     second: Vec<f64>,
+    /// The tail before the last step.
+    tail_before: Vec<f64>,
     /// v of the sample to come.
     next_variance: Vec<f64>,
 }
@@ -215,6 +220,7 @@ impl ErrorRegression {
             moves: topology.per_unit(|group| group.learns_initial_state).collect(),
             first: vec![0.0; n_c],
             second: vec![0.0; n_c],
+            tail_before: vec![0.0; n_c],
             next_variance: vec![0.0; n_v],
             floor: topology.variance_floor(),
             observed: 0,
@@ -252,7 +258,6 @@ impl ErrorRegression {
             } else {
                 self.length += 1;
             }
-            done.steps = self.length;
         }
         // Sample k is the input of step k, which leads to row k + 1 as long as nothing has slid away.
         let row = self.length + (self.delay - 1).min(self.observed);
@@ -550,6 +555,7 @@ impl WithSimd for Regress<'_> {
         regression.first.fill(0.0);
         regression.second.fill(0.0);
         let mut done = Regression { steps: regression.length, ..Regression::default() };
+        let n_c = regression.packed.n_c;
         while done.iterations < regression.options.iterations && go_on() {
             regression.run_window(simd);
             let (ln_likelihood, squared_error) = regression.score(simd);
@@ -557,10 +563,31 @@ impl WithSimd for Regress<'_> {
                 (done.ln_likelihood, done.squared_error) = ([ln_likelihood; 2], [squared_error; 2]);
             }
             regression.run_back(simd);
+            let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
+            if !(ln_likelihood.is_finite() && finite(&regression.deltas[..n_c])) {
+                done.diverged = true;
+                break;
+            }
+            regression.tail_before.copy_from_slice(&regression.internal[..n_c]);
             regression.move_tail(done.iterations);
             done.iterations += 1;
+            if !finite(&regression.internal[..n_c]) {
+                done.diverged = true;
+                break;
+            }
         }
-        if done.iterations > 0 {
+        if done.iterations == 0 {
+            return done;
+        }
+        if !done.diverged {
+            regression.run_window(simd);
+            (done.ln_likelihood[1], done.squared_error[1]) = regression.score(simd);
+            done.diverged = !done.ln_likelihood[1].is_finite();
+        }
+        if done.diverged {
+            // The tail before the last step had a finite score.
+            done.iterations -= 1;
+            regression.internal[..n_c].copy_from_slice(&regression.tail_before);
             regression.run_window(simd);
             (done.ln_likelihood[1], done.squared_error[1]) = regression.score(simd);
         }

@@ -206,6 +206,23 @@ fn small_steps_always_lead_uphill() {
 }
 
 #[test]
+fn a_step_out_of_the_finite_numbers_is_taken_back_and_told() {
+    let network = network(1, true, fast_and_slow());
+    let ascent = Ascent::Momentum { rate: 1e307, momentum: 0.9 };
+    let options = ErrorRegressionOptions { ascent, ..ErrorRegressionOptions::new(3) };
+    let mut regression = ErrorRegression::new(&network, &u0(&network), options, InstructionSet::best()).unwrap();
+    let mut diverged = 0;
+    for t in 0..40 {
+        // Far from all that the network can predict: steep enough for the rate to overflow.
+        let done = regression.observe(&sample(t).map(|x| 1e3 * x), &mut || true).unwrap();
+        diverged += usize::from(done.diverged);
+        assert!(regression.mean().iter().chain(regression.variance()).chain(regression.tail()).all(|x| x.is_finite()));
+        assert!(done.ln_likelihood.iter().all(|x| x.is_finite()));
+    }
+    assert!(diverged > 0);
+}
+
+#[test]
 fn a_control_loop_can_stop_it_at_any_iteration() {
     let network = network(1, true, fast_and_slow());
     let options = ErrorRegressionOptions { iterations: 50, ..ErrorRegressionOptions::new(3) };

@@ -63,7 +63,7 @@ pub struct Arguments {
     /// Number of epochs, instead of the preset's
     #[arg(long, value_name = "N")]
     epochs: Option<u64>,
-    /// Any key of the S-CTRNN's experiment, e.g. --set training.adam.rate=1e-3; `data` counts for all networks
+    /// A key of the S-CTRNN's training or network, e.g. --set training.adam.rate=1e-3
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<Override>,
     /// Train anew what is in the folder already
@@ -129,11 +129,9 @@ fn reproduce<S: Study>(study: &S, arguments: &Arguments, shared: &Shared) -> Res
     let name = format!("{}-{}", arguments.experiment.word(), arguments.preset.word());
     let path = arguments.out.clone().unwrap_or_else(|| Path::new("runs/reproduce").join(&name));
     let folder = RunFolder::open(&path)?;
-    if arguments.overwrite {
-        // A page that is there would speak of trainings that are not.
-        folder.remove(PAGE)?;
-        folder.remove(METRICS)?;
-    }
+    // A page that is there might soon speak of trainings that are not.
+    folder.remove(PAGE)?;
+    folder.remove(METRICS)?;
 
     let cores = shared.engine()?.threads();
     let numbers: Vec<u64> = (0..arguments.seeds).map(|k| arguments.seed.saturating_add(k)).collect();
@@ -144,9 +142,8 @@ fn reproduce<S: Study>(study: &S, arguments: &Arguments, shared: &Shared) -> Res
         let clock = Instant::now();
         let mut networks = Vec::new();
         for (index, kind) in study.networks().iter().enumerate() {
-            let concerns = |change: &&Override| index == 0 || change.path[0] == "data";
-            let changed: Vec<Override> = arguments.set.iter().filter(concerns).cloned().collect();
-            let experiment = kind.experiment(arguments.preset, seed, arguments.epochs, &changed)?;
+            let changed = if index == 0 { arguments.set.as_slice() } else { &[] };
+            let experiment = kind.experiment(arguments.preset, seed, arguments.epochs, changed)?;
             let run = format!("seed-{seed}{}", kind.suffix);
             let label = format!("seed {seed}, {}: ", kind.name);
             let progress = Progress::labelled(&label, experiment.training.epochs, shared.quiet, &bars);
@@ -246,7 +243,8 @@ fn command(arguments: &Arguments) -> String {
         line += &format!(" --epochs {epochs}");
     }
     for change in &arguments.set {
-        line += &format!(" {}", change.typed);
+        let key_and_value = change.typed.trim_start_matches("--set ");
+        line += &format!(" --set '{}'", key_and_value.replace('\'', "'\\''"));
     }
     line
 }

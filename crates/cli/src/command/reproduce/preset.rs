@@ -70,6 +70,19 @@ impl Kind {
         let overrides: std::result::Result<Vec<Override>, String> =
             changes.into_iter().map(|(option, key, value)| Override::shorthand(option, key, value)).collect();
         let mut overrides = overrides.map_err(|message| Failure::input(message, ""))?;
+        for change in changed {
+            // What is measured is made for the experiment's own data and kind of network; seeds have their own options.
+            let free = match change.path.first().map(String::as_str) {
+                Some("training") => true,
+                Some("network") => change.path.get(1).is_some_and(|key| key != "variance"),
+                _ => false,
+            };
+            if !free {
+                let help = "Keys of `training` and `network` can be changed, except `network.variance`; for others write \
+                            an experiment file and take `scrnn train` and `scrnn report`.";
+                return Err(Failure::input(format!("`{}` cannot be changed here", change.typed), help));
+            }
+        }
         overrides.extend_from_slice(changed);
         experiment::read_text(name, text, &overrides)?.resolved(std::path::Path::new(""))
     }
@@ -90,6 +103,18 @@ mod tests {
                 assert_eq!(scaling, "none", "{}", experiment.name);
                 assert_eq!(experiment.network.variance, kind.name == "S-CTRNN");
             }
+        }
+    }
+
+    #[test]
+    fn only_keys_that_the_measures_allow_can_be_changed() {
+        let changed = |text: &str| LISSAJOUS.experiment(Preset::Fast, 1, None, &[text.parse().unwrap()]);
+        let decay = changed("training.adam.weight_decay=0.5").unwrap().training.adam.unwrap().weight_decay;
+        assert_eq!(decay, 0.5);
+        assert_eq!(changed("network.groups.context.units=7").unwrap().network.groups[0].units, 7);
+        for refused in ["network.variance=false", "data.task=sinusoid", "data.scaling=fit", "seed=3", "network=1"] {
+            let message = changed(refused).unwrap_err().to_string();
+            assert!(message.contains("cannot be changed here"), "{refused}: {message}");
         }
     }
 
