@@ -129,9 +129,11 @@ fn reproduce<S: Study>(study: &S, arguments: &Arguments, shared: &Shared) -> Res
     let name = format!("{}-{}", arguments.experiment.word(), arguments.preset.word());
     let path = arguments.out.clone().unwrap_or_else(|| Path::new("runs/reproduce").join(&name));
     let folder = RunFolder::open(&path)?;
-    // A page that is there might soon speak of trainings that are not.
-    folder.remove(PAGE)?;
-    folder.remove(METRICS)?;
+    if arguments.overwrite {
+        // A page that is there would speak of trainings that are not.
+        folder.remove(PAGE)?;
+        folder.remove(METRICS)?;
+    }
 
     let cores = shared.engine()?.threads();
     let numbers: Vec<u64> = (0..arguments.seeds).map(|k| arguments.seed.saturating_add(k)).collect();
