@@ -126,17 +126,19 @@ impl Assessment {
 
     /// The same with the entropy of the noise, whose true variances are known.
     pub fn with_truth(mut self, variances: &Dataset, delay: usize) -> Self {
-        let n = variances.channels().len();
-        let entropies: Vec<f64> = variances
-            .sequences()
-            .iter()
-            .flat_map(|sequence| &sequence.values()[delay * n..])
-            .map(|&v| gaussian_entropy(v))
-            .collect();
-        let mean = entropies.iter().sum::<f64>() / entropies.len() as f64;
-        self.entropy_of_noise = Some(mean).filter(|mean| mean.is_finite());
+        self.entropy_of_noise = entropy_of_noise(variances, delay);
         self
     }
+}
+
+/// The mean entropy of noise with these variances, in nats per step and channel: no nll can be expected below it. None
+/// where some variance is 0.
+pub fn entropy_of_noise(variances: &Dataset, delay: usize) -> Option<f64> {
+    let n = variances.channels().len();
+    let values = variances.sequences().iter().flat_map(|sequence| &sequence.values()[delay * n..]);
+    let entropies: Vec<f64> = values.map(|&v| gaussian_entropy(v)).collect();
+    let mean = entropies.iter().sum::<f64>() / entropies.len() as f64;
+    Some(mean).filter(|mean| mean.is_finite())
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::metrics::Metrics;
 use super::study::{Learned, Study};
-use crate::assessment::learning_curves;
+use crate::assessment::{entropy_of_noise, learning_curves};
 use crate::history::Row;
 use crate::progress::in_words;
 use crate::report::{Block, Page, Section, Sheet};
@@ -91,8 +91,11 @@ fn learning(networks: &[Vec<Learned>]) -> Section {
             .iter()
             .map(|own| (format!("seed {}", own[k].experiment.seed), own[k].history.as_slice()))
             .collect();
-        let floor =
-            first.source.truth.as_ref().and_then(|truth| entropy(&truth.variances, first.network.topology.delay()));
+        let floor = first
+            .source
+            .truth
+            .as_ref()
+            .and_then(|truth| entropy_of_noise(&truth.variances, first.network.topology.delay()));
         let file = format!("learning-{}", first.name.to_lowercase());
         blocks.push(learning_curves(&file, &format!("Learning curve of the {}", first.name), &runs, floor));
     }
@@ -115,15 +118,6 @@ fn learning(networks: &[Vec<Learned>]) -> Section {
         note: "nll in nats per step and channel; time of training alone.".into(),
     }));
     Section { title: "Learning".into(), blocks }
-}
-
-/// The mean entropy of the noise, where it has one.
-fn entropy(variances: &scrnn::dataset::Dataset, delay: usize) -> Option<f64> {
-    let n = variances.channels().len();
-    let values = variances.sequences().iter().flat_map(|sequence| &sequence.values()[delay * n..]);
-    let entropies: Vec<f64> = values.map(|&v| scrnn::evaluation::gaussian_entropy(v)).collect();
-    let mean = entropies.iter().sum::<f64>() / entropies.len() as f64;
-    Some(mean).filter(|mean| mean.is_finite())
 }
 
 /// Settings, machine, time.
