@@ -1,0 +1,3 @@
+//! The robots of the thesis' experiments in a simulated world, and networks that move them.
+
+pub mod scene;
