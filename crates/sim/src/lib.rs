@@ -1,3 +1,17 @@
 //! The robots of the thesis' experiments in a simulated world, and networks that move them.
+//!
+//! A [`robot::Robot`] is read from a description and set into a [`world::World`], which moves it by rapier's physics.
+//! Everything public is in nalgebra's types, metres, radians, seconds and newtons. Nothing here opens a file, prints, or
+//! reads a clock, and the same calls in the same order give the same bits.
 
+pub mod camera;
+pub mod error;
+pub mod gaze;
+pub mod joints;
+pub mod kinematics;
+pub mod nao;
+pub mod robot;
 pub mod scene;
+pub mod world;
+
+mod articulation;

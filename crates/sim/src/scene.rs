@@ -19,6 +19,13 @@ pub enum Shape {
         /// In metres.
         radius: f64,
     },
+    /// Around the origin, along z.
+    Cylinder {
+        /// Half of its length, in metres.
+        half_length: f64,
+        /// In metres.
+        radius: f64,
+    },
     /// A box around the origin.
     Cuboid {
         /// Half of its size along x, y and z, in metres.

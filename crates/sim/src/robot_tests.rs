@@ -1,0 +1,87 @@
+//! Descriptions, sound and broken.
+
+use super::*;
+use crate::nao;
+
+const ARM: &str = r#"<robot name="arm">
+  <link name="base"/>
+  <link name="upper"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
+    <collision><geometry><cylinder radius="0.1" length="0.5"/></geometry></collision></link>
+  <joint name="swivel" type="continuous"><parent link="base"/><child link="upper"/><axis xyz="0 0 2"/>
+    <limit effort="3" velocity="4"/></joint>
+</robot>"#;
+
+fn complaint(from: &str, to: &str) -> String {
+    assert!(ARM.contains(from), "{from}");
+    Robot::from_urdf(&ARM.replace(from, to)).unwrap_err().to_string()
+}
+
+#[test]
+fn any_tree_of_turning_joints_is_read() {
+    let robot = Robot::from_urdf(ARM).unwrap();
+    assert_eq!(robot.joint_names(), ["swivel"]);
+    let (joint, limits) = robot.movable().next().unwrap();
+    assert_eq!((joint.parent, joint.child, limits.effort, limits.velocity), (0, 1, 3.0, 4.0));
+    assert_eq!(robot.links[1].shapes[0].0, Shape::Cylinder { half_length: 0.25, radius: 0.1 });
+    let Motion::Revolute { axis, .. } = joint.motion else { panic!() };
+    assert_eq!(axis.into_inner(), Vector3::z());
+}
+
+#[test]
+fn what_is_wrong_is_named() {
+    let cases = [
+        ("<robot", "<obot", "cannot be read"),
+        (r#"link name="base""#, r#"link name="upper""#, "link `upper`: is described twice"),
+        (
+            r#"<parent link="base"/>"#,
+            r#"<parent link="bse"/>"#,
+            "joint `swivel`: names a link `bse` that is not described",
+        ),
+        ("continuous", "prismatic", "joint `swivel`: is of type Prismatic; needed: revolute"),
+        ("0 0 2", "0 0 0", "joint `swivel`: turns about [0.0, 0.0, 0.0]; needed: a direction"),
+        (r#"effort="3""#, r#"effort="0""#, "joint `swivel`: has the effort limit 0"),
+        ("continuous", "revolute", "joint `swivel`: has limits 0 to 0; needed: a range"),
+        (r#"mass value="1""#, r#"mass value="0""#, "link `upper`: has no mass, but joint `swivel` moves it"),
+        (r#"mass value="1""#, r#"mass value="-1""#, "link `upper`: has a mass of -1"),
+        (r#"izz="1""#, r#"izz="-1""#, "link `upper`: has an inertia that is not positive"),
+        (r#"radius="0.1""#, r#"radius="0""#, "link `upper`: has a cylinder of size 0"),
+        (
+            r#"<cylinder radius="0.1" length="0.5"/>"#,
+            r#"<mesh filename="a.stl"/>"#,
+            "link `upper`: has the mesh `a.stl`",
+        ),
+        (r#"<link name="base"/>"#, r#"<link name="base"/><link name="loose"/>"#, "link `loose`: hangs on no joint"),
+        (r#"<parent link="base"/>"#, r#"<parent link="upper"/>"#, "joint `swivel`: does not hang on the root"),
+    ];
+    for (from, to, expected) in cases {
+        let found = complaint(from, to);
+        assert!(found.contains(expected), "{found}\nneeded: {expected}");
+    }
+}
+
+#[test]
+fn a_locked_joint_holds_its_angle_and_links_keep_their_place() {
+    let mut robot = nao::robot();
+    let mut q: Vec<f64> = (0..robot.dof()).map(|k| 0.1 + 0.03 * k as f64).collect();
+    robot.clamp(&mut q);
+    let before = robot.forward(&q);
+    let joint = robot.joint("RElbowYaw").unwrap();
+    robot.lock("RElbowYaw", q[joint]).unwrap();
+    q.remove(joint);
+    for (a, b) in before.iter().zip(robot.forward(&q)) {
+        assert!((a.translation.vector - b.translation.vector).norm() < 1e-12);
+    }
+    assert!(robot.joint("RElbowYaw").unwrap_err().to_string().contains("there is no movable joint `RElbowYaw`"));
+    assert!(robot.lock("HeadYaw", 9.0).is_err());
+}
+
+#[test]
+fn neighbours_may_overlap_and_others_may_not() {
+    let robot = nao::robot();
+    let may = |a, b| robot.may_overlap(robot.link(a).unwrap(), robot.link(b).unwrap());
+    // The neck and the shoulder have no shape: head and torso are neighbours.
+    assert!(may("torso", "head") && may("r_bicep", "r_hand") && may("r_forearm", "r_hand") && may("torso", "r_bicep"));
+    assert!(
+        !may("torso", "r_hand") && !may("torso", "r_forearm") && !may("head", "r_hand") && !may("r_hand", "l_hand")
+    );
+}
