@@ -6,11 +6,13 @@
 
 pub mod camera;
 pub mod error;
+pub mod follower;
 pub mod gaze;
 pub mod interaction;
 pub mod joints;
 pub mod kinematics;
 pub mod nao;
+pub mod recording;
 pub mod robot;
 pub mod scene;
 pub mod world;
