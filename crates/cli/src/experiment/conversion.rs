@@ -13,6 +13,7 @@ use super::{
     ScalingName, ScalingRanges, TaskName, Training,
 };
 use crate::failure::{Failure, Result};
+use crate::interactions;
 
 impl TaskName {
     /// Number of sequences and of samples in each, as in the thesis.
@@ -34,6 +35,7 @@ impl TaskName {
                 let limit_cycle::Options { sequences, steps } = limit_cycle::Options::default();
                 (sequences, steps)
             }
+            Self::Interact => interactions::size(),
         }
     }
 }
@@ -90,7 +92,10 @@ impl Data {
             let path: PathBuf = folder.join(&*file);
             *file = std::path::absolute(&path).map_err(|error| Failure::disk("find", &path, error))?;
         }
-        let by_default = if self.task.is_some() { ScalingName::None } else { ScalingName::Fit };
+        let by_default = match self.task {
+            None | Some(TaskName::Interact) => ScalingName::Fit,
+            Some(_) => ScalingName::None,
+        };
         self.scaling.get_or_insert(ScalingChoice::Named(by_default));
         Ok(())
     }
