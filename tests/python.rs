@@ -1,5 +1,5 @@
-//! Python beside the program: numpy and pandas write what it reads and read what it writes, and numpy computes from a
-//! checkpoint what it generates.
+//! Python beside the program: numpy and pandas write what it reads and read what it writes, numpy computes from a
+//! checkpoint what it generates, and mcap reads recordings.
 //!
 //! The interpreter is SCRNN_PYTHON, else the one in .venv, which .ci/run makes. It needs what
 //! tests/python/requirements.txt lists. Without one these tests say that they were skipped; where CI is set, they fail.
@@ -8,21 +8,28 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use scrnn_sim::recording::{Contact, Heading, Joint, Recorder, Robot};
+use scrnn_sim::scene::{Body, Frame, Part, Scene, Shape};
+
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
+
+/// What the scripts use.
+const IMPORTS: &str = "import numpy, pandas, safetensors, mcap, mcap_protobuf, foxglove_schemas_protobuf";
 
 /// An interpreter that has all packages.
 fn python() -> Option<PathBuf> {
     let venv = if cfg!(windows) { ".venv/Scripts/python.exe" } else { ".venv/bin/python" };
     let python = std::env::var_os("SCRNN_PYTHON").map_or_else(|| root().join(venv), PathBuf::from);
-    let import = Command::new(&python).args(["-c", "import numpy, pandas, safetensors"]).output();
+    let import = Command::new(&python).args(["-c", IMPORTS]).output();
     match import {
         Ok(output) if output.status.success() => Some(python),
         found => {
             let why = found.map_or_else(|error| error.to_string(), |output| text(&output.stderr));
             let why = why.lines().last().unwrap_or_default().to_owned();
-            let message = format!("no Python with numpy, pandas and safetensors: {}: {why}", python.display());
+            let message =
+                format!("no Python with what tests/python/requirements.txt lists: {}: {why}", python.display());
             assert!(std::env::var_os("CI").is_none(), "{message}");
             // Past the test harness, which shows nothing of a test that passes.
             let mut terminal = std::io::stderr().lock();
@@ -196,4 +203,87 @@ fn numpy_and_pandas_read_the_same_bits_from_every_file() {
     place.agrees("compare_files.py", "observed . 25");
     let output = place.script("compare_files.py", "observed . 26");
     assert_eq!(output.status.code(), Some(1), "{}", text(&output.stdout));
+}
+
+/// An arm of two links beside a ball on a bench, at an angle of its joint.
+fn scene(angle: f64) -> Scene {
+    let body = |name: &str, part, shape, x: f64| {
+        let mut body = Body { name: name.into(), part, shape, world_from_shape: Default::default() };
+        body.world_from_shape.translation.vector.x = x;
+        body
+    };
+    let frame = |name: &str, x: f64, angle: f64| {
+        let mut frame = Frame { name: name.into(), world_from_frame: Default::default() };
+        frame.world_from_frame.translation.vector.x = x;
+        // A quaternion's numbers are i, j, k, w.
+        let turned = frame.world_from_frame.rotation.as_mut_unchecked();
+        (turned.k, turned.w) = (angle / 2.0).sin_cos();
+        frame
+    };
+    let capsule = Shape::Capsule { a: [0.0, 0.0, 0.1].into(), b: [0.0, 0.0, -0.1].into(), radius: 0.03 };
+    Scene {
+        bodies: vec![
+            body("self/hand", Part::Hand, capsule, 0.1),
+            body("ball", Part::Object, Shape::Sphere { radius: 0.02 }, 0.3),
+            body("bench", Part::Furniture, Shape::Cuboid { half_extents: [0.2, 0.3, 0.01] }, 0.0),
+        ],
+        frames: vec![frame("self/base", 0.5, 0.0), frame("self/hand", 0.6, angle)],
+    }
+}
+
+#[test]
+fn python_reads_recordings_with_schemas_that_are_foxgloves_own() {
+    let Some(place) = Place::new() else { return };
+    let urdf = r#"<robot name="arm"><link name="base"/><link name="hand"/><joint name="elbow" type="revolute">
+        <parent link="base"/><child link="hand"/><axis xyz="0 0 1"/>
+        <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"#;
+    let channels = ["elbow", "vision x"].map(str::to_owned);
+    let heading = Heading {
+        robots: &[Robot { prefix: "self/", urdf }],
+        experiment: Some("name = \"arm\"\n"),
+        channels: &channels,
+        notes: &[("seed", "1")],
+    };
+    let file = std::fs::File::create(place.folder.path().join("arm.mcap")).unwrap();
+    let mut recorder = Recorder::new(file, &heading).unwrap();
+    for step in 0..20_u64 {
+        let (time, angle) = (step * 1_500_000_000, step as f64 / 20.0);
+        recorder.begin_sequence(time, &format!("one {step}")).unwrap();
+        recorder.scene(time, &scene(angle)).unwrap();
+        let elbow = Joint { name: "elbow", position: angle, velocity: Some(0.5), effort: Some(-0.25) };
+        recorder.joint_states(time, &[elbow]).unwrap();
+        recorder.joint_targets(time, &[Joint::at("elbow", angle + 0.125)]).unwrap();
+        recorder.sensed(time, &[angle, 1e-300]).unwrap();
+        recorder.predicted(time, &[angle, 0.0], Some(&[1e-4, 0.5])).unwrap();
+        let contact = Contact { a: "self/hand", b: "ball", distance: Some(0.0), force: Some(2.5) };
+        recorder.contacts(time, &[contact]).unwrap();
+        recorder.event(time, "touch", &[("gap", 0.001)]).unwrap();
+    }
+    recorder.finish().unwrap();
+
+    let found: serde_json::Value = serde_json::from_str(&place.agrees("read_recording.py", "arm.mcap")).unwrap();
+    assert_eq!(found["attachments"]["self/robot.urdf"], urdf);
+    assert_eq!(found["attachments"]["experiment.toml"], "name = \"arm\"\n");
+    let counts = found["counts"].as_object().unwrap();
+    assert_eq!(counts.len(), 10, "{counts:?}");
+    assert!(counts.values().all(|count| count == 20), "{counts:?}");
+    let last = &found["last"];
+    assert_eq!(last["/joint_states"]["joints"][0]["effort"], -0.25);
+    assert_eq!(last["/sensed"]["elbow"], 0.95);
+    assert_eq!(last["/sensed"]["vision x"].as_f64().unwrap().to_bits(), 1e-300_f64.to_bits());
+    assert_eq!(last["/contacts"]["contacts"][0]["b"], "ball");
+    // The hand hangs on the base: a tenth of a metre away, turned by the joint's angle.
+    let hand = &last["/transforms"]["transforms"][1];
+    assert_eq!((&hand["parent_frame_id"], &hand["child_frame_id"]), (&"self/base".into(), &"self/hand".into()));
+    assert!((hand["translation"]["x"].as_f64().unwrap() - 0.1).abs() < 1e-12, "{hand}");
+    assert!((hand["rotation"]["z"].as_f64().unwrap() - (0.95_f64 / 2.0).sin()).abs() < 1e-12, "{hand}");
+    let entities = last["/scene"]["entities"].as_array().unwrap();
+    assert_eq!(entities.len(), 3);
+    assert_eq!(entities[0]["spheres"].as_array().unwrap().len(), 2);
+    assert_eq!(entities[0]["cylinders"][0]["size"]["z"], 0.2);
+    assert_eq!(entities[2]["cubes"][0]["size"]["y"], 0.6);
+    // A recording that lost its end, as after a crash, is not whole.
+    let bytes = std::fs::read(place.folder.path().join("arm.mcap")).unwrap();
+    std::fs::write(place.folder.path().join("cut.mcap"), &bytes[..bytes.len() - 100]).unwrap();
+    assert_ne!(place.script("read_recording.py", "cut.mcap").status.code(), Some(0));
 }

@@ -10,6 +10,7 @@ pub mod gaze;
 pub mod joints;
 pub mod kinematics;
 pub mod nao;
+pub mod recording;
 pub mod robot;
 pub mod scene;
 pub mod world;

@@ -45,7 +45,7 @@ pub fn learning_curves(file: &str, title: &str, runs: &[(String, &[Row])], floor
     let chart =
         Chart { columns: 1, aspect: 2.2, x_label: "epoch".into(), y_label: y_label.into(), panels: vec![panel] };
     let (file, title, thesis) = (file.to_owned(), title.to_owned(), String::new());
-    Block::Figure(Box::new(Figure { file, title, caption: caption.into(), thesis, chart }))
+    Block::Figure(Box::new(Figure { file, title, caption: caption.into(), thesis, drawing: chart.into() }))
 }
 
 /// The nll beside simple models, and predicted beside observed standard deviations.
@@ -103,7 +103,7 @@ pub fn calibration_blocks(assessment: &Assessment) -> Vec<Block> {
                   square of the errors that came. On the line, predictions are right."
             .into(),
         thesis: String::new(),
-        chart,
+        drawing: chart.into(),
     })));
     blocks
 }

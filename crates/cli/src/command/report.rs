@@ -177,7 +177,13 @@ fn drawn(data: &Dataset, trained: &Trained, generated: &[Generated], open: bool)
                            each sequence. It need not follow the recording, but should look like it.";
             (format!("on-its-own-{}", i + 1), format!("{channel}, generated"), caption)
         };
-        Block::Figure(Box::new(Figure { file, title, caption: caption.into(), thesis: String::new(), chart }))
+        Block::Figure(Box::new(Figure {
+            file,
+            title,
+            caption: caption.into(),
+            thesis: String::new(),
+            drawing: chart.into(),
+        }))
     };
     (0..n).map(figure).collect()
 }
@@ -212,7 +218,7 @@ fn initial_state_plane(trained: &Trained) -> Option<Section> {
             100.0 * components.share(2)
         ),
         thesis: String::new(),
-        chart,
+        drawing: chart.into(),
     };
     Some(Section { title: "Initial states".into(), blocks: vec![Block::Figure(Box::new(figure))] })
 }

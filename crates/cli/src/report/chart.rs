@@ -58,6 +58,39 @@ impl Tone {
     fn colour(self) -> RGBColor {
         self.entry().1
     }
+
+    /// The colour in the light theme, as SVG writes it.
+    pub(super) fn hex(self) -> String {
+        hex(self.colour())
+    }
+}
+
+fn hex(RGBColor(r, g, b): RGBColor) -> String {
+    format!("#{r:02X}{g:02X}{b:02X}")
+}
+
+/// A drawing in light colours, in those of the page's theme.
+pub(super) fn themed(mut svg: String) -> String {
+    for (name, colour) in TONES {
+        let hex = hex(colour);
+        svg = svg.replace(&format!("\"{hex}\""), &format!("\"var(--{name},{hex})\""));
+    }
+    svg
+}
+
+/// A drawing in light colours, on white.
+pub(super) fn on_white(svg: &str) -> String {
+    let end = svg.find("</title>").map_or(0, |at| at + "</title>\n".len());
+    let (head, rest) = svg.split_at(end);
+    format!("{head}<rect width=\"100%\" height=\"100%\" fill=\"#FFFFFF\"/>\n{rest}")
+}
+
+/// A text as a field of a CSV file.
+pub(super) fn csv_field(text: &str) -> String {
+    match text.contains([',', '"', '\n']) {
+        true => format!("\"{}\"", text.replace('"', "\"\"")),
+        false => text.to_owned(),
+    }
 }
 
 /// How points are drawn.
@@ -160,9 +193,9 @@ struct Entry<'a> {
 }
 
 /// Width of all charts in the SVG's own units: two for each of the page's.
-const WIDTH: u32 = 1360;
+pub(super) const WIDTH: u32 = 1360;
 /// Height of text: readable where a phone shows the chart at a quarter of its size.
-const TEXT: f64 = 38.0;
+pub(super) const TEXT: f64 = 38.0;
 const LEGEND_ROW: i32 = 58;
 const FONT: &str = "sans-serif";
 
@@ -170,46 +203,25 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Drawn = Result<(), Box<dyn std::error::Error>>;
 
 impl Chart {
-    /// The chart as an SVG element whose colours follow the page's theme, with `title` for those who cannot see it.
-    pub fn inline_svg(&self, title: &str) -> String {
-        let mut svg = self.svg(title);
-        for (name, RGBColor(r, g, b)) in TONES {
-            let hex = format!("#{r:02X}{g:02X}{b:02X}");
-            svg = svg.replace(&format!("\"{hex}\""), &format!("\"var(--{name},{hex})\""));
-        }
-        svg
-    }
-
-    /// The chart as a file of its own, in light colours on white.
-    pub fn file_svg(&self, title: &str) -> String {
-        let svg = self.svg(title);
-        let end = svg.find("</title>").map_or(0, |at| at + "</title>\n".len());
-        let (head, rest) = svg.split_at(end);
-        format!("{head}<rect width=\"100%\" height=\"100%\" fill=\"#FFFFFF\"/>\n{rest}")
-    }
-
     /// All points: panel, series, x, y.
-    pub fn csv(&self) -> String {
+    pub(super) fn csv(&self) -> String {
         let mut text = "panel,series,x,y\n".to_owned();
-        let field = |text: &str| match text.contains([',', '"', '\n']) {
-            true => format!("\"{}\"", text.replace('"', "\"\"")),
-            false => text.to_owned(),
-        };
         for panel in &self.panels {
             for series in &panel.series {
                 for (k, (x, y)) in series.points.iter().enumerate() {
                     let name = match &series.mark {
-                        Mark::Texts(texts) => field(&format!("{} {}", series.name, texts[k])),
-                        _ => field(&series.name),
+                        Mark::Texts(texts) => csv_field(&format!("{} {}", series.name, texts[k])),
+                        _ => csv_field(&series.name),
                     };
-                    writeln!(text, "{},{name},{x:?},{y:?}", field(&panel.title)).expect("a string takes all");
+                    writeln!(text, "{},{name},{x:?},{y:?}", csv_field(&panel.title)).expect("a string takes all");
                 }
             }
         }
         text
     }
 
-    fn svg(&self, title: &str) -> String {
+    /// The chart as an SVG element in light colours, with `title` for those who cannot see it.
+    pub(super) fn svg(&self, title: &str) -> String {
         let rows = self.panels.len().div_ceil(self.columns);
         let width = f64::from(WIDTH) / self.columns as f64;
         let furniture = match self.columns {
@@ -230,10 +242,7 @@ impl Chart {
             root.present().expect("a string takes all");
         }
         let body = svg.split_once(">\n").map_or("", |(_, body)| body);
-        let dashed = {
-            let RGBColor(r, g, b) = Tone::Truth.colour();
-            format!("stroke=\"#{r:02X}{g:02X}{b:02X}\"")
-        };
+        let dashed = format!("stroke=\"{}\"", Tone::Truth.hex());
         let body = body.replace(&dashed, &format!("{dashed} stroke-dasharray=\"14 9\""));
         let title = super::page::escaped(title);
         format!(
@@ -394,7 +403,7 @@ mod tests {
 
     #[test]
     fn a_chart_has_a_title_text_and_colours_of_the_theme() {
-        let svg = chart().inline_svg("Waves & more");
+        let svg = themed(chart().svg("Waves & more"));
         assert!(svg.starts_with("<svg viewBox=") && svg.trim_end().ends_with("</svg>"), "{svg}");
         for part in [
             "<title>Waves &amp; more</title>",
@@ -413,7 +422,7 @@ mod tests {
 
     #[test]
     fn a_file_is_light_on_white_and_names_no_variable() {
-        let svg = chart().file_svg("x");
+        let svg = on_white(&chart().svg("x"));
         assert!(svg.contains("fill=\"#FFFFFF\"") && !svg.contains("var("));
     }
 

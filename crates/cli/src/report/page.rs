@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::chart::Chart;
+use super::chart::{Chart, on_white, themed};
+use super::picture::Pictures;
 
 const STYLE: &str = include_str!("page.css");
 
@@ -52,7 +53,37 @@ pub struct Sheet {
     pub note: String,
 }
 
-/// A chart with its words.
+/// What a figure shows.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Drawing {
+    /// Numbers.
+    Chart(Chart),
+    /// Scenes.
+    Pictures(Pictures),
+}
+
+impl From<Chart> for Drawing {
+    fn from(chart: Chart) -> Self {
+        Self::Chart(chart)
+    }
+}
+
+impl From<Pictures> for Drawing {
+    fn from(pictures: Pictures) -> Self {
+        Self::Pictures(pictures)
+    }
+}
+
+impl Drawing {
+    fn svg(&self, title: &str) -> String {
+        match self {
+            Self::Chart(chart) => chart.svg(title),
+            Self::Pictures(pictures) => pictures.svg(title),
+        }
+    }
+}
+
+/// A drawing with its words.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
     /// Name of its files, without extension.
@@ -64,7 +95,7 @@ pub struct Figure {
     /// What the thesis' figure shows; may be empty.
     pub thesis: String,
     /// The drawing.
-    pub chart: Chart,
+    pub drawing: Drawing,
 }
 
 impl Page {
@@ -149,10 +180,28 @@ impl Sheet {
 }
 
 impl Figure {
+    /// The drawing as an SVG element whose colours follow the page's theme.
+    fn inline_svg(&self) -> String {
+        themed(self.drawing.svg(&self.title))
+    }
+
+    /// The drawing as a file of its own, in light colours on white.
+    pub fn file_svg(&self) -> String {
+        on_white(&self.drawing.svg(&self.title))
+    }
+
+    /// The numbers that it is drawn from.
+    pub fn csv(&self) -> String {
+        match &self.drawing {
+            Drawing::Chart(chart) => chart.csv(),
+            Drawing::Pictures(pictures) => pictures.csv(),
+        }
+    }
+
     fn html(&self, out: &mut String) {
-        let Self { file, title, caption, thesis, chart } = self;
-        *out +=
-            &format!("<figure id=\"{}\">\n<div class=\"plot\">\n{}</div>\n", escaped(file), chart.inline_svg(title));
+        let Self { file, title, caption, thesis, .. } = self;
+        let name = escaped(file);
+        *out += &format!("<figure id=\"{name}\">\n<div class=\"plot\">\n{}</div>\n", self.inline_svg());
         *out += &format!("<figcaption><b>{}</b>{}", escaped(title), escaped(caption));
         if !thesis.is_empty() {
             *out += &format!("<span class=\"thesis\">Thesis: {}</span>", escaped(thesis));
@@ -189,7 +238,7 @@ mod tests {
             title: "A <wave>".into(),
             caption: "Read it.".into(),
             thesis: "Fig. 1".into(),
-            chart,
+            drawing: chart.into(),
         };
         let sheet = Sheet {
             caption: "T".into(),

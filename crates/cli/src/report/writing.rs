@@ -17,8 +17,8 @@ pub fn write(page: &Page, folder: &Path) -> Result<()> {
     let figures = folder.join(FIGURES);
     fs::create_dir_all(&figures).map_err(|error| Failure::disk("make the folder", &figures, error))?;
     for figure in page.figures() {
-        replace(&figures.join(format!("{}.svg", figure.file)), figure.chart.file_svg(&figure.title).as_bytes())?;
-        replace(&figures.join(format!("{}.csv", figure.file)), figure.chart.csv().as_bytes())?;
+        replace(&figures.join(format!("{}.svg", figure.file)), figure.file_svg().as_bytes())?;
+        replace(&figures.join(format!("{}.csv", figure.file)), figure.csv().as_bytes())?;
     }
     replace(&folder.join(PAGE), page.html().as_bytes())?;
     Ok(())

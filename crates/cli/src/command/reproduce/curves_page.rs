@@ -59,7 +59,7 @@ fn phase_plots<'a>(
 
 fn figure(file: &str, title: &str, caption: &str, thesis: &str, chart: Chart) -> Block {
     let [file, title, caption, thesis] = [file, title, caption, thesis].map(str::to_owned);
-    Block::Figure(Box::new(Figure { file, title, caption, thesis, chart }))
+    Block::Figure(Box::new(Figure { file, title, caption, thesis, drawing: chart.into() }))
 }
 
 /// Steps of a phase plot: many panels have room for few.

@@ -271,7 +271,7 @@ fn time(material: &Material) -> Block {
                   beside the one that the oscillator would have at the network's output (3.12)."
             .into(),
         thesis: "Fig. 3.7: the output has the data's structure, and the predicted variance is close to the true one.".into(),
-        chart,
+        drawing: chart.into(),
     }))
 }
 
@@ -308,7 +308,7 @@ fn phase(material: &Material) -> Block {
                   for its output z is computed by (3.10) from y, starting from that of the data."
             .into(),
         thesis: "Fig. 3.8: the output has the structure of the data, and the contexts share it.".into(),
-        chart,
+        drawing: chart.into(),
     }))
 }
 

@@ -188,7 +188,7 @@ impl Study for Sinusoid {
                       beside the true one. Nobody told the network how the noise grows and falls."
                 .into(),
             thesis: "Fig. 3.6: the output has the noise of the data, and the predicted variance is close to the true one.".into(),
-            chart,
+            drawing: chart.into(),
         };
         vec![
             Section { title: "Closed loop".into(), blocks: vec![Block::Figure(Box::new(figure))] },
