@@ -61,8 +61,8 @@ enum Form {
         b: (f64, f64),
         radii: (f64, f64),
     },
-    /// Faces that look at the eye.
-    Faces(Vec<[(f64, f64); 4]>),
+    /// Faces that look at the eye, each by its corners.
+    Faces(Vec<Vec<(f64, f64)>>),
 }
 
 /// Where the picture's plane lies on the paper.
@@ -75,6 +75,8 @@ struct Paper {
 
 const GAP: f64 = 16.0;
 const CAPTION: f64 = 58.0;
+/// Points on the rim of a cylinder.
+const RIM: i32 = 32;
 
 impl Pictures {
     /// As one SVG element; colours are those of the light theme.
@@ -171,6 +173,14 @@ fn painted<'a>(body: &'a Body, pale: bool, eye_from_world: &Isometry3<f64>) -> O
             let ((a, near), (b, far)) = (seen(*a)?, seen(*b)?);
             (Form::Bar { a, b, radii: (radius / near, radius / far) }, 0.5 * (near + far))
         }
+        Shape::Cylinder { half_length, radius } => {
+            let rim = |k: i32, end: f64| {
+                let angle = std::f64::consts::TAU * f64::from(k) / f64::from(RIM);
+                seen(Point3::new(radius * angle.cos(), radius * angle.sin(), end * half_length)).map(|(at, _)| at)
+            };
+            let around: Option<Vec<_>> = (0..RIM).flat_map(|k| [rim(k, -1.0), rim(k, 1.0)]).collect();
+            (Form::Faces(vec![hull(around?)]), seen(Point3::origin())?.1)
+        }
         Shape::Cuboid { half_extents } => {
             let half = Vector3::from(*half_extents);
             let mut faces = Vec::new();
@@ -187,13 +197,9 @@ fn painted<'a>(body: &'a Body, pale: bool, eye_from_world: &Isometry3<f64>) -> O
                     let middle = eye_from_shape * Point3::from(normal.component_mul(&half));
                     // A face is seen if its outside looks towards the eye, which is at the origin.
                     if (eye_from_shape * normal).dot(&middle.coords) < 0.0 {
-                        let mut around = [(0.0, 0.0); 4];
-                        for (place, (s, t)) in
-                            around.iter_mut().zip([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
-                        {
-                            *place = seen(corner(s, t))?.0;
-                        }
-                        faces.push(around);
+                        let around = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+                        let around = around.map(|(s, t)| seen(corner(s, t)).map(|(at, _)| at));
+                        faces.push(around.into_iter().collect::<Option<Vec<_>>>()?);
                     }
                 }
             }
@@ -263,6 +269,29 @@ impl Painted<'_> {
         let end = if matches!(self.form, Form::Disc { .. }) { "circle" } else { "path" };
         writeln!(out, "<title>{}</title></{end}>", escaped(&self.body.name)).expect("a string takes all");
     }
+}
+
+/// The corners of the smallest convex outline around points, one way round.
+fn hull(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let turn = |a: (f64, f64), b: (f64, f64), c: (f64, f64)| (b.0 - a.0) * (c.1 - a.1) - (b.1 - a.1) * (c.0 - a.0);
+    // From left to right along one side, and back along the other.
+    let side = |points: &mut dyn Iterator<Item = (f64, f64)>| {
+        let mut side: Vec<(f64, f64)> = Vec::new();
+        for point in points {
+            while let [.., a, b] = side[..]
+                && turn(a, b, point) <= 0.0
+            {
+                side.pop();
+            }
+            side.push(point);
+        }
+        side.pop();
+        side
+    };
+    let mut around = side(&mut points.iter().copied());
+    around.extend(side(&mut points.iter().rev().copied()));
+    around
 }
 
 /// The outline of two discs and what lies between them: the common tangents outside, and an arc around each end.
@@ -361,6 +390,17 @@ mod tests {
         let Form::Disc { centre, radius } = painted(&ball, false, &view).unwrap().form else { panic!("a disc") };
         // Seen from +x, +y lies to the right.
         assert!((centre.0 - 0.25).abs() < 1e-12 && centre.1.abs() < 1e-12 && (radius - 0.05).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_cylinder_from_the_side_is_a_bar_without_round_ends() {
+        let square = vec![(0.0, 0.0), (1.0, 1.0), (0.5, 0.4), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0)];
+        assert_eq!(hull(square), [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]);
+        let can = body("can", Part::Object, Shape::Cylinder { half_length: 0.1, radius: 0.05 }, [0.0; 3]);
+        let view = Isometry3::look_at_rh(&Point3::new(100.0, 0.0, 0.0), &Point3::origin(), &Vector3::z());
+        let outline = corners(&painted(&can, false, &view).unwrap());
+        let widest = |of: fn(&(f64, f64)) -> f64| outline.iter().map(of).fold(0.0, f64::max) * 100.0;
+        assert!((widest(|at| at.0) - 0.05).abs() < 1e-4 && (widest(|at| at.1) - 0.1).abs() < 1e-4);
     }
 
     #[test]

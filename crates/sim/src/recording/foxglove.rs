@@ -71,16 +71,21 @@ fn primitives(body: &Body, entity: &mut Message) {
                 entity.message(9, |out| primitive(place, Vector3::repeat(2.0 * radius), color, out));
             }
             let (along, length) = cylinder_from_axis(a, b);
-            let size = Vector3::new(2.0 * radius, 2.0 * radius, length);
-            entity.message(10, |out| {
-                out.message(1, |out| pose(place * along, out));
-                out.message(2, |out| vector(size, out));
-                out.double(3, 1.0);
-                out.double(4, 1.0);
-                out.message(5, |out| rgba(color, out));
-            });
+            entity.message(10, |out| cylinder(place * along, *radius, length, color, out));
+        }
+        Shape::Cylinder { half_length, radius } => {
+            entity.message(10, |out| cylinder(place, *radius, 2.0 * half_length, color, out));
         }
     }
+}
+
+/// A cylinder around its z axis, as wide at the top as at the bottom.
+fn cylinder(place: Isometry3<f64>, radius: f64, length: f64, color: [f64; 4], out: &mut Message) {
+    out.message(1, |out| pose(place, out));
+    out.message(2, |out| vector(Vector3::new(2.0 * radius, 2.0 * radius, length), out));
+    out.double(3, 1.0);
+    out.double(4, 1.0);
+    out.message(5, |out| rgba(color, out));
 }
 
 /// Where a cylinder around its z axis stands that reaches from `a` to `b`, and how long it is.
