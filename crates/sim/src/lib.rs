@@ -7,6 +7,7 @@
 pub mod camera;
 pub mod error;
 pub mod gaze;
+pub mod interaction;
 pub mod joints;
 pub mod kinematics;
 pub mod nao;
