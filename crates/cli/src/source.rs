@@ -37,7 +37,7 @@ pub fn load(data: &Data) -> Result<Source> {
     let paths = data.files.as_deref().unwrap_or_default();
     let mut sets = Vec::with_capacity(paths.len());
     for path in paths {
-        sets.push((path, files::read(path)?));
+        sets.push((path, files::read_part(path, &data.selection())?));
     }
     let data = match sets.as_slice() {
         [(_, only)] => only.clone(),

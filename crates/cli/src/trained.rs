@@ -9,6 +9,7 @@ use serde::Deserialize;
 
 use crate::experiment::Experiment;
 use crate::failure::{Failure, Result};
+use crate::files::Selection;
 use crate::notes::Notes;
 use crate::run_folder::{BEST, CHECKPOINT};
 use crate::source;
@@ -51,6 +52,12 @@ impl Trained {
     pub fn network(&self) -> Network {
         let Checkpoint { topology, parameters, .. } = &self.checkpoint;
         Network { topology: topology.clone(), parameters: parameters.clone() }
+    }
+
+    /// Which part of its files it learned, where that is known.
+    pub fn selection(&self) -> Option<Selection> {
+        let experiment = Experiment::deserialize(&self.notes.as_ref()?.experiment).ok()?;
+        Some(experiment.data.selection())
     }
 
     /// The sequences that it learned, made or read again.

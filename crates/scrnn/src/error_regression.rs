@@ -28,107 +28,15 @@ use crate::network::Network;
 use crate::packed::Packed;
 use crate::parameters::Block;
 
-/// How the internal state is moved; every sample starts from rest.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Ascent {
-    /// Gradient ascent with momentum, as in the thesis.
-    Momentum {
-        /// alpha_reg.
-        rate: f64,
-        /// eta.
-        momentum: f64,
-    },
-    /// Adam (Kingma and Ba, 2015), with its usual constants.
-    Adam {
-        /// The step's size in units of the internal state.
-        rate: f64,
-    },
-}
+mod options;
 
-/// How to regress.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ErrorRegressionOptions {
-    /// W, in steps.
-    pub window: usize,
-    /// Forward and backward passes for each sample.
-    pub iterations: usize,
-    /// How the state is moved.
-    pub ascent: Ascent,
-    /// Longest gradient; a longer one is shortened to this length.
-    pub max_norm: Option<f64>,
-    /// Share of the sensed sample in the input of each channel when time goes on: 1 senses, 0 runs on the own prediction.
-    pub sensed: Vec<f64>,
-    /// The same inside of the window; all 0 in the thesis.
-    pub sensed_in_window: Vec<f64>,
-}
-
-impl ErrorRegressionOptions {
-    /// A window of 20 steps and 10 iterations with the thesis' kind of ascent; every channel senses, and the window runs
-    /// in the closed loop.
-    #[must_use]
-    pub fn new(channels: usize) -> Self {
-        Self {
-            window: 20,
-            iterations: 10,
-            ascent: Ascent::Momentum { rate: 1.25e-4, momentum: 0.9 },
-            max_norm: None,
-            sensed: vec![1.0; channels],
-            sensed_in_window: vec![0.0; channels],
-        }
-    }
-
-    fn check(&self, channels: usize) -> Result<()> {
-        if self.window == 0 {
-            return Err(Error::Setting { what: "the window", found: "0".to_owned(), needed: "at least 1 step" });
-        }
-        let positive = |what, value: f64| match value > 0.0 && value.is_finite() {
-            true => Ok(()),
-            false => Err(Error::Setting { what, found: value.to_string(), needed: "a positive number" }),
-        };
-        match self.ascent {
-            Ascent::Adam { rate } => positive("the regression rate", rate)?,
-            Ascent::Momentum { rate, momentum } => {
-                positive("the regression rate", rate)?;
-                if !(0.0..1.0).contains(&momentum) {
-                    let (found, needed) = (momentum.to_string(), "a number from 0 to below 1");
-                    return Err(Error::Setting { what: "the regression's momentum", found, needed });
-                }
-            }
-        }
-        if let Some(norm) = self.max_norm {
-            positive("the longest gradient", norm)?;
-        }
-        for (what, shares) in [("the sensed shares", &self.sensed), ("the window's shares", &self.sensed_in_window)] {
-            if shares.len() != channels {
-                return Err(Error::Length { what: what.to_owned(), found: shares.len(), needed: channels });
-            }
-            if let Some(share) = shares.iter().find(|share| !(0.0..=1.0).contains(*share)) {
-                return Err(Error::Setting { what, found: share.to_string(), needed: "numbers from 0 to 1" });
-            }
-        }
-        Ok(())
-    }
-}
-
-/// What one sample's regression did.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Regression {
-    /// Steps in the window.
-    pub steps: usize,
-    /// Iterations that were made.
-    pub iterations: usize,
-    /// ln L_reg of the closed-loop window before the first iteration and after the last; -E without variance units.
-    pub ln_likelihood: [f64; 2],
-    /// Sums of squared errors in the window, before and after.
-    pub squared_error: [f64; 2],
-    /// Whether a step left the finite numbers: it was taken back, and no more were made.
-    pub diverged: bool,
-}
+pub use options::{Ascent, ErrorRegressionOptions, Regression};
 
 /// A network that runs beside a stream of samples. Everything is allocated at the start.
 ///
 /// Row r of the window is the state after its r-th step; row 0 is the tail, u_{t-W}. One row more is the step that
-/// predicts the sample to come.
+/// predicts the sample to come, and as many more as are asked for look further ahead: their inputs are samples as long as
+/// there are some, then what was predicted.
 #[derive(Debug)]
 pub struct ErrorRegression {
     packed: Packed,
@@ -171,7 +79,7 @@ pub struct ErrorRegression {
     second: Vec<f64>,
     /// The tail before the last step.
     tail_before: Vec<f64>,
-    /// v of the sample to come.
+    /// v of the samples to come.
     next_variance: Vec<f64>,
 }
 
@@ -202,11 +110,12 @@ impl ErrorRegression {
         let window = options.window;
         let zeros = |count: usize| AVec::from_iter(64, std::iter::repeat_n(0.0, count));
         let n_v = packed.n_out - n_x;
+        let rows = window + 2 + options.ahead;
         let mut regression = Self {
-            internal: zeros((window + 2) * packed.rows),
-            states: zeros((window + 2) * packed.state_stride),
-            mean: zeros((delay + window + 2) * n_x),
-            variance: zeros((window + 2) * n_v),
+            internal: zeros(rows * packed.rows),
+            states: zeros(rows * packed.state_stride),
+            mean: zeros((delay + rows) * n_x),
+            variance: zeros(rows * n_v),
             samples: zeros((window + delay + 1) * n_x),
             deltas: zeros((window + 2) * packed.delta_stride),
             mean_delta: zeros((window + 1) * n_x),
@@ -221,7 +130,7 @@ impl ErrorRegression {
             first: vec![0.0; n_c],
             second: vec![0.0; n_c],
             tail_before: vec![0.0; n_c],
-            next_variance: vec![0.0; n_v],
+            next_variance: vec![0.0; (1 + options.ahead) * n_v],
             floor: topology.variance_floor(),
             observed: 0,
             length: 0,
@@ -289,7 +198,43 @@ impl ErrorRegression {
     /// v of the sample to come, N_O values; empty without variance units.
     #[must_use]
     pub fn variance(&self) -> &[f64] {
-        &self.next_variance
+        &self.next_variance[..self.next_variance.len() / (1 + self.options.ahead)]
+    }
+
+    /// y of the sample `steps` after the next one, of 0 to [`ErrorRegressionOptions::ahead`]; from the options' xi on it is
+    /// predicted from predictions alone.
+    ///
+    /// # Panics
+    /// If that is further ahead than the options ask for.
+    #[must_use]
+    pub fn foreseen_mean(&self, steps: usize) -> &[f64] {
+        self.check_ahead(steps);
+        self.mean_of(self.length + 1 + steps)
+    }
+
+    /// v of that sample; empty without variance units.
+    ///
+    /// # Panics
+    /// As [`ErrorRegression::foreseen_mean`].
+    #[must_use]
+    pub fn foreseen_variance(&self, steps: usize) -> &[f64] {
+        self.check_ahead(steps);
+        let n_v = self.next_variance.len() / (1 + self.options.ahead);
+        &self.next_variance[steps * n_v..(steps + 1) * n_v]
+    }
+
+    /// The context that predicts it, N_C values.
+    ///
+    /// # Panics
+    /// As [`ErrorRegression::foreseen_mean`].
+    #[must_use]
+    pub fn foreseen_context(&self, steps: usize) -> &[f64] {
+        self.check_ahead(steps);
+        &self.states[(self.length + 1 + steps) * self.packed.state_stride..][..self.packed.n_c]
+    }
+
+    fn check_ahead(&self, steps: usize) {
+        assert!(steps <= self.options.ahead, "{steps} steps ahead; the options ask for {}", self.options.ahead);
     }
 
     /// The mean that the window now holds for its step `step` of 0 to [`ErrorRegression::window`]; the last is the
@@ -341,9 +286,14 @@ impl ErrorRegression {
         let shares = if in_window { &self.options.sensed_in_window } else { &self.options.sensed };
         // Counted from the first step ever, the step is number `step`, and its prediction was made in step - xi.
         let step = self.observed - self.delay + row - self.length;
-        let sample = &self.samples[(row - 1) * n_x..row * n_x];
         let predicted = &self.mean[row * n_x..(row + 1) * n_x];
+        let known = row <= self.length + self.delay;
         let x = &mut self.states[(row - 1) * self.packed.state_stride + self.packed.rows..][..n_x];
+        if !known {
+            x.copy_from_slice(predicted);
+            return;
+        }
+        let sample = &self.samples[(row - 1) * n_x..row * n_x];
         for i in 0..n_x {
             x[i] = match step > self.delay {
                 true => shares[i] * sample[i] + (1.0 - shares[i]) * predicted[i],
@@ -517,7 +467,7 @@ impl WithSimd for Enter<'_> {
     }
 }
 
-/// The step that predicts the sample to come.
+/// The steps that predict the samples to come.
 struct Predict<'a>(&'a mut ErrorRegression);
 
 impl WithSimd for Predict<'_> {
@@ -526,14 +476,17 @@ impl WithSimd for Predict<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let regression = self.0;
-        let row = regression.length + 1;
-        regression.leave(simd, row);
-        regression.set_input(row, false);
-        regression.arrive(simd, row);
-        regression.leave(simd, row + 1);
+        let first = regression.length + 1;
+        for row in first..=first + regression.options.ahead {
+            regression.leave(simd, row);
+            regression.set_input(row, false);
+            regression.arrive(simd, row);
+        }
+        regression.leave(simd, first + regression.options.ahead + 1);
         let n_x = regression.packed.n_x;
         if !regression.next_variance.is_empty() {
-            regression.next_variance.copy_from_slice(&regression.variance[row * n_x..][..n_x]);
+            let len = regression.next_variance.len();
+            regression.next_variance.copy_from_slice(&regression.variance[first * n_x..][..len]);
             exp_slice(simd, 1.0, &mut regression.next_variance);
             regression.next_variance.iter_mut().for_each(|v| *v += regression.floor);
         }

@@ -263,3 +263,40 @@ fn senseless_requests_are_refused_and_leave_no_trace() {
     assert!(regression.observe(&[0.0], &mut || true).is_err());
     assert_eq!((regression.mean(), regression.window()), (&before[..], 3));
 }
+
+#[test]
+fn what_is_foreseen_is_what_generation_gives_once_samples_run_out() {
+    for (delay, count) in [(1, 9), (3, 2), (3, 3), (3, 4), (5, 30)] {
+        let network = network(delay, true, fast_and_slow());
+        let (iterations, ahead) = (0, 8);
+        let options = ErrorRegressionOptions {
+            iterations,
+            ahead,
+            window: 6,
+            sensed: vec![1.0, 0.0, 0.5],
+            ..ErrorRegressionOptions::new(3)
+        };
+        let mut regression = ErrorRegression::new(&network, &u0(&network), options, InstructionSet::best()).unwrap();
+        observe_all(&mut regression, count);
+        if count < delay {
+            continue;
+        }
+        let sensed: Vec<f64> = (0..count).flat_map(sample).collect();
+        let mut feedback = Feedback::mixed(3, 1.0, false);
+        (feedback.0[1].sensed, feedback.0[2].sensed) = (0.0, 0.5);
+        let steps = count - delay + 1 + ahead;
+        let options = GenerationOptions { steps, feedback, seed: 1, contexts: true };
+        let start = Start { initial_state: &u0(&network), sensed: &sensed };
+        let generated = generate(&network, &[start], &options, &Engine::serial()).unwrap().remove(0);
+        let close = |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12);
+        for steps in 0..=ahead {
+            let row = count - delay + steps;
+            let own = |list: &[f64], size: usize| list[row * size..(row + 1) * size].to_vec();
+            let found = regression.foreseen_mean(steps);
+            assert!(close(found, &own(&generated.mean, 3)), "delay {delay}, {count} samples, {steps} ahead: {found:?}");
+            assert!(close(regression.foreseen_variance(steps), &own(&generated.variance, 3)));
+            assert!(close(regression.foreseen_context(steps), &own(&generated.contexts, 13)));
+        }
+        assert_eq!(regression.foreseen_mean(0), regression.mean());
+    }
+}

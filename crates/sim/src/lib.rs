@@ -9,6 +9,7 @@ pub mod camera;
 pub mod channels;
 pub mod error;
 pub mod gaze;
+pub mod interaction;
 pub mod joints;
 pub mod kinematics;
 pub mod nao;

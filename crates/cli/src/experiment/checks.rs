@@ -78,7 +78,27 @@ fn check_data(data: &Data) -> Check {
                 }
             }
         }
-        (Some(_), None) => {}
+        (Some(_), None) => {
+            let of_files = [
+                ("topic", data.topic.is_some()),
+                ("period", data.period.is_some()),
+                ("channels", data.channels.is_some()),
+            ];
+            for (key, given) in of_files {
+                if given {
+                    return complaint(&["data", key], format!("`data.{key}` does not go with `task`"), "leave it out");
+                }
+            }
+        }
+    }
+    if let Some(period) = data.period {
+        positive(&["data", "period"], period)?;
+    }
+    if let Some(channels) = &data.channels {
+        let path = ["data", "channels"];
+        must(!channels.is_empty(), &path, "empty", "at least one name")?;
+        let twice = channels.iter().enumerate().find(|(index, name)| channels[..*index].contains(name));
+        must(twice.is_none(), &path, "a list that names a channel twice", "each channel once")?;
     }
     must(data.sequences != Some(0), &["data", "sequences"], 0, "at least 1")?;
     must(data.steps != Some(0), &["data", "steps"], 0, "at least 1 more than the delay")?;

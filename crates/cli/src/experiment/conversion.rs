@@ -13,6 +13,7 @@ use super::{
     ScalingName, ScalingRanges, TaskName, Training,
 };
 use crate::failure::{Failure, Result};
+use crate::files::Selection;
 
 impl TaskName {
     /// Number of sequences and of samples in each, as in the thesis.
@@ -93,6 +94,11 @@ impl Data {
         let by_default = if self.task.is_some() { ScalingName::None } else { ScalingName::Fit };
         self.scaling.get_or_insert(ScalingChoice::Named(by_default));
         Ok(())
+    }
+
+    /// Which part of its files is meant.
+    pub fn selection(&self) -> Selection {
+        Selection { topic: self.topic.clone(), period: self.period, channels: self.channels.clone() }
     }
 
     /// The scaling that the experiment asks for, fitted to `data` if that is asked for.

@@ -59,10 +59,19 @@ pub struct Data {
     /// Seed of the task's noise. Default 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
-    /// Files to read, relative to the experiment file: .csv, .txt, .npy or .npz. The sequences of all of them are learned
-    /// together.
+    /// Files to read, relative to the experiment file: .csv, .txt, .npy, .npz or .mcap. The sequences of all of them are
+    /// learned together.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub files: Option<Vec<PathBuf>>,
+    /// The topic whose messages are samples, in .mcap files. Default: /sensed, or the only one whose messages are JSON.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub topic: Option<String>,
+    /// Seconds between samples, to which the messages of .mcap files are brought. Default: as they are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub period: Option<f64>,
+    /// Names of the channels to learn, in this order. Default: all that the files have.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub channels: Option<Vec<String>>,
     /// How samples are brought into the reach of the mean units, which is -1 to 1. Default: "fit" for files, "none" for
     /// tasks.
     #[serde(default, skip_serializing_if = "Option::is_none")]

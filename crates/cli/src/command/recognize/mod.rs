@@ -10,7 +10,7 @@ use scrnn::generation::{Feedback, Generated, GenerationOptions, Start, generate}
 use scrnn::recognition::{Recognition, RecognitionOptions, recognize};
 use serde::Serialize;
 
-use crate::args::Shared;
+use crate::args::{Part, Shared};
 use crate::command::generate::unit_names;
 use crate::failure::{Ending, Failure, Result};
 use crate::files::{self, Field};
@@ -37,8 +37,10 @@ Examples:
 pub struct Arguments {
     /// A run folder or a checkpoint file
     run: PathBuf,
-    /// The sequences to recognise: .csv, .txt, .npy or .npz
+    /// The sequences to recognise: .csv, .txt, .npy, .npz or .mcap
     data: PathBuf,
+    #[command(flatten)]
+    part: Part,
     /// Number of starts for each sequence
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
     starts: u32,
@@ -109,7 +111,8 @@ struct Tried {
 pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     let trained = Trained::open(&arguments.run, arguments.best)?;
     let checkpoint = &trained.checkpoint;
-    let data = files::read(&arguments.data)?;
+    let part = arguments.part.of(&arguments.data, trained.selection());
+    let data = files::read_part(&arguments.data, &part)?;
     trained.check_channels(&data, &arguments.data)?;
     data.check_for(&checkpoint.topology)?;
     let delay = checkpoint.topology.delay();
