@@ -9,7 +9,7 @@
 //! without noise, and that state is moved uphill; then the window's past is overwritten with what follows from it, and
 //! so is the prediction of the next sample. Only the groups whose initial state is learned are moved.
 //!
-//! The gradient is exact: it also runs through the means that the window feeds back to itself. Inputs of the window's
+//! Channels can be left out of ln L_reg, or count in part. The gradient is exact: it also runs through the means that the window feeds back to itself. Inputs of the window's
 //! first xi steps are the means predicted before it, which stay as they were, or samples where there was no prediction
 //! yet.
 
@@ -373,6 +373,12 @@ impl ErrorRegression {
             precisions: &mut self.precisions,
         }
         .score(simd, self.floor);
+        if self.options.heeded.iter().any(|share| *share != 1.0) {
+            let lists = [&mut self.mean_delta, &mut self.variance_delta, &mut self.terms, &mut self.squares];
+            for row in lists.into_iter().flat_map(|list| list.chunks_exact_mut(n_x).take(self.length)) {
+                row.iter_mut().zip(&self.options.heeded).for_each(|(value, share)| *value *= share);
+            }
+        }
         (self.terms[..len].iter().sum(), self.squares[..len].iter().sum())
     }
 

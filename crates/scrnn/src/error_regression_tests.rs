@@ -57,7 +57,15 @@ impl WithSimd for Evaluate<'_> {
 
 /// (2.28) in plain loops. `means` are those predicted before the window, oldest first; `first` is the number of the
 /// window's first step.
-fn plain(network: &Network, tail: &[f64], means: &[f64], first: usize, steps: usize, shares: &[f64]) -> f64 {
+fn plain(
+    network: &Network,
+    tail: &[f64],
+    means: &[f64],
+    first: usize,
+    steps: usize,
+    shares: &[f64],
+    heeded: &[f64],
+) -> f64 {
     let delay = network.topology.delay();
     let mut state = Plain::new(network, tail);
     let mut means: Vec<Vec<f64>> = means.chunks(3).map(<[f64]>::to_vec).collect();
@@ -70,10 +78,11 @@ fn plain(network: &Network, tail: &[f64], means: &[f64], first: usize, steps: us
         state.step(&x);
         means.push(state.y.clone());
         for (i, target) in sample(step + delay).iter().enumerate() {
-            sum += match state.v.get(i) {
+            let term = match state.v.get(i) {
                 Some(&v) => ln_gaussian(*target, state.y[i], v),
                 None => -0.5 * (target - state.y[i]).powi(2),
             };
+            sum += heeded[i] * term;
         }
     }
     sum
@@ -81,18 +90,19 @@ fn plain(network: &Network, tail: &[f64], means: &[f64], first: usize, steps: us
 
 #[test]
 fn the_gradient_at_the_tail_agrees_with_central_differences() {
-    for (delay, variance, count, shares) in [
-        (1, true, 30, [0.0; 3]),
-        (1, false, 5, [0.0; 3]),
-        (2, true, 30, [0.25, 0.0, 1.0]),
-        (5, true, 40, [0.0; 3]),
-        (5, false, 9, [0.5; 3]),
+    for (delay, variance, count, shares, heeded) in [
+        (1, true, 30, [0.0; 3], [1.0; 3]),
+        (1, false, 5, [0.0; 3], [1.0; 3]),
+        (2, true, 30, [0.25, 0.0, 1.0], [1.0; 3]),
+        (5, true, 40, [0.0; 3], [1.0, 0.5, 0.0]),
+        (5, false, 9, [0.5; 3], [0.0, 1.0, 1.0]),
     ] {
         let network = network(delay, variance, fast_and_slow());
         let options = ErrorRegressionOptions {
             window: 12,
             iterations: 0,
             sensed_in_window: shares.to_vec(),
+            heeded: heeded.to_vec(),
             ..ErrorRegressionOptions::new(3)
         };
         for set in InstructionSet::available() {
@@ -103,7 +113,7 @@ fn the_gradient_at_the_tail_agrees_with_central_differences() {
             let first = count - delay - steps;
             let before = regression.mean[3..3 * (delay + 1)].to_vec();
             let (ln_likelihood, gradient) = set.run(Evaluate(&mut regression));
-            let at = |tail: &[f64]| plain(&network, tail, &before, first, steps, &shares);
+            let at = |tail: &[f64]| plain(&network, tail, &before, first, steps, &shares, &heeded);
             assert!((ln_likelihood - at(&tail)).abs() < 1e-10 * (1.0 + ln_likelihood.abs()));
             for i in 0..tail.len() {
                 let moved = |by: f64| {

@@ -269,6 +269,12 @@ impl Interaction {
         })
     }
 
+    /// Where the object goes, branching by branching.
+    #[must_use]
+    pub fn order(&self) -> &[Side] {
+        &self.order
+    }
+
     /// Samples until the order is at its end.
     #[must_use]
     pub fn samples(&self) -> usize {

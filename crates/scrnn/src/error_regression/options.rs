@@ -34,6 +34,9 @@ pub struct ErrorRegressionOptions {
     pub sensed: Vec<f64>,
     /// The same inside of the window; all 0 in the thesis.
     pub sensed_in_window: Vec<f64>,
+    /// Share of each channel's errors in ln L_reg: 0 does not heed a channel, e.g. that of a joint which the network moves
+    /// itself, and which therefore always is where it was predicted.
+    pub heeded: Vec<f64>,
     /// Samples to predict beyond the next one.
     pub ahead: usize,
 }
@@ -50,6 +53,7 @@ impl ErrorRegressionOptions {
             max_norm: None,
             sensed: vec![1.0; channels],
             sensed_in_window: vec![0.0; channels],
+            heeded: vec![1.0; channels],
             ahead: 0,
         }
     }
@@ -75,7 +79,11 @@ impl ErrorRegressionOptions {
         if let Some(norm) = self.max_norm {
             positive("the longest gradient", norm)?;
         }
-        for (what, shares) in [("the sensed shares", &self.sensed), ("the window's shares", &self.sensed_in_window)] {
+        for (what, shares) in [
+            ("the sensed shares", &self.sensed),
+            ("the window's shares", &self.sensed_in_window),
+            ("the heeded shares", &self.heeded),
+        ] {
             if shares.len() != channels {
                 return Err(Error::Length { what: what.to_owned(), found: shares.len(), needed: channels });
             }

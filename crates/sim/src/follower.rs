@@ -1,0 +1,196 @@
+//! A network that follows the other robot (thesis 5.2.3, 5.3.2): it senses object and head, predicts, and moves the arm to
+//! where it predicts it, one sample from now. Its own arm it does not sense: the prediction is fed back instead.
+//!
+//! With iterations of error regression it revises its slow state while it acts (5.3.4), without it runs as it is.
+
+use nalgebra::{Isometry3, Point3};
+use scrnn::analysis::excursions::{Levels, Side};
+use scrnn::analysis::reaction::{ReactionRule, arm_error};
+use scrnn::engine::InstructionSet;
+use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions, Regression};
+use scrnn::network::Network;
+use scrnn::scaling::Scaling;
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+use crate::interaction::{ARM, CHANNELS, Collision, Interaction, arm_postures, branchings, primitive_len};
+use crate::nao;
+
+/// A trained network as an interaction needs it.
+#[derive(Debug, Clone, Copy)]
+pub struct Mind<'a> {
+    /// The network.
+    pub network: &'a Network,
+    /// Leads from the sensors' units to the network's.
+    pub scaling: &'a Scaling,
+    /// u_0.
+    pub initial_state: &'a [f64],
+    /// Instructions to compute with.
+    pub instruction_set: InstructionSet,
+}
+
+/// The feedback of an interaction: the arm runs on its own predictions, and its errors, which are none, are not regressed
+/// on. Everything else is left as it is in `options`.
+#[must_use]
+pub fn with_own_arm(mut options: ErrorRegressionOptions) -> ErrorRegressionOptions {
+    for channel in ARM {
+        options.sensed[channel] = 0.0;
+        options.heeded[channel] = 0.0;
+    }
+    options
+}
+
+/// One sample of an interaction.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Moment {
+    /// What was sensed, in pixels and radians.
+    pub sensed: [f64; 8],
+    /// What the sample was predicted as, in the network's units; none before the first prediction.
+    pub predicted: Option<[f64; 8]>,
+    /// The variance that was predicted for it, in the network's units; empty without variance units.
+    pub variance: Vec<f64>,
+    /// The context that predicts the next sample.
+    pub context: Vec<f64>,
+    /// What the regression did.
+    pub regression: Regression,
+    /// E_t (D.3): where the arm is told to be, against where a tutor would lead it.
+    pub error: f64,
+    /// How far out the hand is: 1 to the left, -1 to the right.
+    pub hand: f64,
+    /// What the robot ran into until the next sample.
+    pub collision: Option<Collision>,
+}
+
+/// How a branching went.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Outcome {
+    /// The hand went to the object's side.
+    Success,
+    /// The hand went to the other side.
+    Opposite,
+    /// The robot ran into the other one or the object.
+    Collision,
+    /// The hand went nowhere.
+    Stayed,
+}
+
+/// One branching.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Branch {
+    /// Where the object went.
+    pub side: Side,
+    /// How it went.
+    pub outcome: Outcome,
+    /// What the robot ran into first.
+    pub collision: Option<Collision>,
+    /// In samples.
+    pub reaction_time: usize,
+}
+
+/// A whole interaction.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Followed {
+    /// All samples.
+    pub moments: Vec<Moment>,
+    /// All branchings.
+    pub branches: Vec<Branch>,
+}
+
+/// Lets the network follow an order to its end. `go_on` is asked before each iteration of a regression; `watch` sees the
+/// world at each sample, before time passes.
+///
+/// # Errors
+/// [`Error::Length`] for a network of other channels, and [`Error::Network`] for options out of their range.
+pub fn follow(
+    mind: &Mind<'_>,
+    options: &ErrorRegressionOptions,
+    interaction: &mut Interaction,
+    go_on: &mut dyn FnMut() -> bool,
+    mut watch: impl FnMut(&Interaction, &Moment, &ErrorRegression),
+) -> Result<Followed> {
+    let channels = mind.network.topology.channels();
+    if channels != CHANNELS.len() {
+        return Err(Error::Length { what: "the network's list of channels", found: channels, needed: CHANNELS.len() });
+    }
+    let Mind { network, scaling, initial_state, instruction_set } = *mind;
+    let mut regression = ErrorRegression::new(network, initial_state, options.clone(), instruction_set)?;
+    let levels = hand_levels()?;
+    let [centre, ..] = arm_postures();
+    let mut arm = centre;
+    let mut moments: Vec<Moment> = Vec::with_capacity(interaction.samples());
+    for k in 0..interaction.samples() {
+        let sensed = interaction.sense();
+        let predicted = (k >= network.topology.delay()).then(|| array(regression.mean()));
+        let variance = if predicted.is_some() { regression.variance().to_vec() } else { Vec::new() };
+        let scaled: [f64; 8] = std::array::from_fn(|channel| scaling.to_scaled(channel, sensed[channel]));
+        let done = regression.observe(&scaled, go_on)?;
+        if k + 1 >= network.topology.delay() {
+            let mean = regression.mean();
+            arm = std::array::from_fn(|joint| scaling.to_raw(ARM.start + joint, mean[ARM.start + joint]));
+        }
+        let tutor = interaction.tutor();
+        let to_scaled = |angles: [f64; 4]| -> [f64; 4] {
+            std::array::from_fn(|joint| scaling.to_scaled(ARM.start + joint, angles[joint]))
+        };
+        let mut moment = Moment {
+            sensed,
+            predicted,
+            variance,
+            context: regression.context(regression.window()).to_vec(),
+            regression: done,
+            error: arm_error(&to_scaled(arm), &to_scaled(tutor)),
+            hand: levels.out(interaction.hand_place().y),
+            collision: None,
+        };
+        watch(interaction, &moment, &regression);
+        interaction.step(arm);
+        moment.collision = interaction.collision();
+        moments.push(moment);
+    }
+    let branches = judge(&moments, interaction.order());
+    Ok(Followed { moments, branches })
+}
+
+fn array(values: &[f64]) -> [f64; 8] {
+    std::array::from_fn(|channel| values[channel])
+}
+
+/// Where the hand is in the centre, to the left and to the right.
+fn hand_levels() -> Result<Levels> {
+    let robot = nao::load_one_armed()?;
+    let effector = robot.link("r_effector")?;
+    let place = |arm: [f64; 4]| {
+        let root_from_hand: Isometry3<f64> = robot.forward(&[&[0.0, 0.0][..], &arm].concat())[effector];
+        Point3::from(root_from_hand.translation.vector).y
+    };
+    let [centre, left, right] = arm_postures().map(place);
+    Ok(Levels { centre, left, right })
+}
+
+/// What became of each branching: a collision counts first, then a move to the wrong side that begins in its primitive.
+#[must_use]
+fn judge(moments: &[Moment], order: &[Side]) -> Vec<Branch> {
+    let levels = Levels { centre: 0.0, left: 1.0, right: -1.0 };
+    let excursions = levels.excursions(moments.iter().map(|moment| moment.hand));
+    // The error of a sample is that of the next one's arm.
+    let errors: Vec<f64> = std::iter::once(0.0).chain(moments.iter().map(|moment| moment.error)).collect();
+    let rule = ReactionRule::default();
+    let one = |(&side, begin): (&Side, usize)| {
+        let end = (begin + primitive_len()).min(moments.len());
+        let went = |to: Side| excursions.iter().any(|one| one.side == to && (begin..end).contains(&one.begins));
+        let collision = moments[begin..end].iter().find_map(|moment| moment.collision);
+        let outcome = match collision {
+            Some(_) => Outcome::Collision,
+            None if went(side.other()) => Outcome::Opposite,
+            None if went(side) => Outcome::Success,
+            None => Outcome::Stayed,
+        };
+        Branch { side, outcome, collision, reaction_time: rule.time(&errors, begin) }
+    };
+    order.iter().zip(branchings(order.len())).map(one).collect()
+}
+
+#[cfg(test)]
+#[path = "follower_tests.rs"]
+mod tests;
