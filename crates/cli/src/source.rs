@@ -6,7 +6,7 @@ use sha2::{Digest, Sha256};
 
 use crate::experiment::{Data, TaskName};
 use crate::failure::{Failure, Result};
-use crate::files;
+use crate::{files, interactions};
 
 /// Sequences in their own units.
 #[derive(Debug)]
@@ -32,6 +32,10 @@ pub fn load(data: &Data) -> Result<Source> {
         let (sequences, steps) = task.size();
         let size = (data.sequences.unwrap_or(sequences), data.steps.unwrap_or(steps));
         let Task { data, variances, .. } = make(task, size, data.seed.unwrap_or(1))?;
+        if task == TaskName::Interact {
+            // The sensors' noise is not all that cannot be foreseen: nobody knows the true variances.
+            return Ok(Source { data, truth: None });
+        }
         return Ok(Source { data, truth: Some(Truth { task, variances }) });
     }
     let paths = data.files.as_deref().unwrap_or_default();
@@ -77,6 +81,7 @@ pub fn make(task: TaskName, (sequences, steps): (usize, usize), seed: u64) -> Re
         TaskName::Patterns => patterns::generate(&patterns::Options { sequences, steps }, seed)?,
         TaskName::Sinusoid => sinusoid::generate(&sinusoid::Options { sequences, steps }, seed)?,
         TaskName::LimitCycle => limit_cycle::generate(&limit_cycle::Options { sequences, steps }, seed)?.task,
+        TaskName::Interact => interactions::make((sequences, steps), seed)?,
     })
 }
 

@@ -97,16 +97,17 @@ pub struct Followed {
     pub branches: Vec<Branch>,
 }
 
-/// Lets the network follow an order to its end. `go_on` is asked before each iteration of a regression; `watch` sees the
-/// world at each sample, before time passes.
+/// Lets the network follow an order to its end. `observe` hands each sample to the regression, and may keep a deadline;
+/// `watch` sees the world at each sample, before time passes.
 ///
 /// # Errors
-/// [`Error::Length`] for a network of other channels, and [`Error::Network`] for options out of their range.
+/// [`Error::Length`] for a network of other channels, [`Error::Network`] for options out of their range, and what `observe`
+/// refuses.
 pub fn follow(
     mind: &Mind<'_>,
     options: &ErrorRegressionOptions,
     interaction: &mut Interaction,
-    go_on: &mut dyn FnMut() -> bool,
+    mut observe: impl FnMut(&mut ErrorRegression, &[f64]) -> scrnn::error::Result<Regression>,
     mut watch: impl FnMut(&Interaction, &Moment, &ErrorRegression),
 ) -> Result<Followed> {
     let channels = mind.network.topology.channels();
@@ -124,7 +125,7 @@ pub fn follow(
         let predicted = (k >= network.topology.delay()).then(|| array(regression.mean()));
         let variance = if predicted.is_some() { regression.variance().to_vec() } else { Vec::new() };
         let scaled: [f64; 8] = std::array::from_fn(|channel| scaling.to_scaled(channel, sensed[channel]));
-        let done = regression.observe(&scaled, go_on)?;
+        let done = observe(&mut regression, &scaled)?;
         if k + 1 >= network.topology.delay() {
             let mean = regression.mean();
             arm = std::array::from_fn(|joint| scaling.to_raw(ARM.start + joint, mean[ARM.start + joint]));

@@ -62,10 +62,11 @@ fn the_loop_runs_from_sensors_to_arm_and_the_same_seed_gives_the_same_bits() {
         instruction_set: InstructionSet::best(),
     };
     let options = with_own_arm(ErrorRegressionOptions { iterations: 2, ..ErrorRegressionOptions::new(8) });
+    let observe = |regression: &mut ErrorRegression, sample: &[f64]| regression.observe(sample, &mut || true);
     let run = || {
         let mut interaction = Interaction::new(&parse_order("R").unwrap(), &InteractionOptions::default(), 5).unwrap();
         let mut commands = Vec::new();
-        let followed = follow(&mind, &options, &mut interaction, &mut || true, |_, _, regression| {
+        let followed = follow(&mind, &options, &mut interaction, observe, |_, _, regression| {
             commands.push(regression.mean()[ARM.start]);
         });
         (followed.unwrap(), commands)
@@ -82,6 +83,6 @@ fn the_loop_runs_from_sensors_to_arm_and_the_same_seed_gives_the_same_bits() {
     let (network, states) = initialize(&stranger, 1, 3);
     let mind = Mind { network: &network, initial_state: states.sequence(0), ..mind };
     let mut interaction = Interaction::new(&[Side::Left], &InteractionOptions::default(), 5).unwrap();
-    let refused = follow(&mind, &options, &mut interaction, &mut || true, |_, _, _| {}).unwrap_err();
+    let refused = follow(&mind, &options, &mut interaction, observe, |_, _, _| {}).unwrap_err();
     assert!(refused.to_string().contains("channels holds 2 values; needed: 8"), "{refused}");
 }

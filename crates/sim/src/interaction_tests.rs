@@ -6,8 +6,8 @@ fn quiet() -> InteractionOptions {
     InteractionOptions { noise: SensorNoise([0.0; 8]), ..InteractionOptions::default() }
 }
 
-fn one(order: &str) -> Dataset {
-    record(&[parse_order(order).unwrap()], &quiet(), 1, |_, _, _| {}).unwrap()
+fn one(order: &str) -> Sequence {
+    record(&parse_order(order).unwrap(), &quiet(), 1, usize::MAX, |_, _| {}).unwrap()
 }
 
 #[test]
@@ -29,7 +29,7 @@ fn orders_are_all_there_and_read_back() {
 #[test]
 fn the_tutored_arm_goes_to_the_object_s_side_and_comes_back() {
     let data = one("LR");
-    let roll = |sample: usize| data.sequences()[0].sample(sample)[5];
+    let roll = |sample: usize| data.sample(sample)[5];
     for (sample, target) in [(0, -0.280), (20, -0.280), (60, 0.272), (108, -0.280), (150, -0.597), (199, -0.280)] {
         assert!((roll(sample) - target).abs() < 0.02, "sample {sample}: {} for {target}", roll(sample));
     }
@@ -38,7 +38,7 @@ fn the_tutored_arm_goes_to_the_object_s_side_and_comes_back() {
 #[test]
 fn the_head_lags_behind_so_that_the_image_shows_the_movement() {
     let data = one("LR");
-    let x = |sample: usize| data.sequences()[0].sample(sample)[0];
+    let x = |sample: usize| data.sample(sample)[0];
     assert!((x(0) - 160.0).abs() < 1.0, "{}", x(0));
     // The object moves to the left of the image, then the head catches up.
     let leftmost = (20..70).map(x).fold(f64::INFINITY, f64::min);
@@ -47,7 +47,7 @@ fn the_head_lags_behind_so_that_the_image_shows_the_movement() {
     let rightmost = (110..140).map(x).fold(0.0, f64::max);
     assert!((190.0..215.0).contains(&rightmost), "{rightmost}");
     // What the head's yaw settles at was computed apart from this code.
-    let yaw = data.sequences()[0].sample(69)[2];
+    let yaw = data.sample(69)[2];
     assert!((yaw - 0.565).abs() < 0.02, "{yaw}");
 }
 
@@ -76,17 +76,17 @@ fn nothing_touches_while_the_robots_agree_and_hands_collide_when_they_do_not() {
 
 #[test]
 fn noise_has_the_deviation_that_was_asked_for_and_the_same_seed_the_same_bits() {
-    let order = [parse_order("L").unwrap()];
+    let order = parse_order("L").unwrap();
     let options = InteractionOptions::default();
-    let noisy = record(&order, &options, 3, |_, _, _| {}).unwrap();
-    assert_eq!(noisy, record(&order, &options, 3, |_, _, _| {}).unwrap());
-    assert_ne!(noisy, record(&order, &options, 4, |_, _, _| {}).unwrap());
-    let clean = record(&order, &quiet(), 3, |_, _, _| {}).unwrap();
+    let noisy = record(&order, &options, 3, usize::MAX, |_, _| {}).unwrap();
+    assert_eq!(noisy, record(&order, &options, 3, usize::MAX, |_, _| {}).unwrap());
+    assert_ne!(noisy, record(&order, &options, 4, usize::MAX, |_, _| {}).unwrap());
+    let clean = record(&order, &quiet(), 3, usize::MAX, |_, _| {}).unwrap();
     for channel in 0..8 {
-        let squares: f64 = noisy.sequences()[0]
+        let squares: f64 = noisy
             .values()
             .chunks(8)
-            .zip(clean.sequences()[0].values().chunks(8))
+            .zip(clean.values().chunks(8))
             .map(|(a, b)| (a[channel] - b[channel]).powi(2))
             .sum();
         let ratio = (squares / 110.0).sqrt() / options.noise.0[channel];

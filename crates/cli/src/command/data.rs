@@ -7,11 +7,11 @@ use scrnn::tasks::Task;
 
 use crate::args::Shared;
 use crate::experiment::TaskName;
-use crate::failure::{Ending, Result};
+use crate::failure::{Ending, Failure, Result};
 use crate::files::{self, Field};
-use crate::{output, source};
+use crate::{interactions, output, source};
 
-/// Write the sequences of the thesis' chapter 3
+/// Write the sequences of the thesis' experiments
 ///
 /// Samples go to FILE. What the noise hides, the true mean and variance of each sample, goes beside them into
 /// FILE.truth, so that FILE itself can be learned from: train with files = ["FILE"].
@@ -20,7 +20,9 @@ use crate::{output, source};
 Examples:
   scrnn data sinusoid                                    the samples as CSV on stdout
   scrnn data lissajous --seed 7 --out lissajous.npz      also writes lissajous.truth.npz
-  scrnn data limit-cycle --sequences 3 --steps 200 --out three.csv")]
+  scrnn data limit-cycle --sequences 3 --steps 200 --out three.csv
+  scrnn data interact --out interact.npz                 two robots, all 32 orders, from the physics
+  scrnn data interact --sequences 1 --out world.mcap     a recording to watch")]
 pub struct Arguments {
     /// Which sequences
     task: TaskName,
@@ -30,10 +32,10 @@ pub struct Arguments {
     /// Number of sequences [default: as in the thesis]
     #[arg(long, value_name = "N")]
     sequences: Option<usize>,
-    /// Samples in each sequence [default: as in the thesis, 1000]
+    /// Samples in each sequence [default: as in the thesis, 1000 or 470]
     #[arg(long, value_name = "N")]
     steps: Option<usize>,
-    /// Where to write the samples: .csv, .txt, .npy or .npz. Without it, CSV on stdout
+    /// Where to write the samples: .csv, .txt, .npy or .npz, and .mcap for robots. Without it, CSV on stdout
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Where to write the true means and variances [default: FILE with `.truth` before its extension]
@@ -45,6 +47,14 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     let (sequences, steps) = arguments.task.size();
     let size = (arguments.sequences.unwrap_or(sequences), arguments.steps.unwrap_or(steps));
+    if let Some(path) = arguments.out.as_deref().filter(|path| is_mcap(path)) {
+        if arguments.task != TaskName::Interact {
+            let message = format!("{} would be a recording of a world, and this task has none", path.display());
+            return Err(Failure::input(message, "write .csv, .txt, .npy or .npz"));
+        }
+        interactions::film(path, size, arguments.seed)?;
+        return Ok(Ending::Done);
+    }
     let Task { data, means, variances } = source::make(arguments.task, size, arguments.seed)?;
     let samples = [Field { name: "", data: &data }];
     match &arguments.out {
@@ -56,6 +66,10 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         shared.say(format_args!("true means and variances: {}", path.display()));
     }
     Ok(Ending::Done)
+}
+
+fn is_mcap(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"))
 }
 
 /// Where the truth goes. A `.npy` has room for one array only, a `.npz` has for both.

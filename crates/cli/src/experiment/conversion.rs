@@ -14,6 +14,7 @@ use super::{
 };
 use crate::failure::{Failure, Result};
 use crate::files::Selection;
+use crate::interactions;
 
 impl TaskName {
     /// Number of sequences and of samples in each, as in the thesis.
@@ -35,6 +36,7 @@ impl TaskName {
                 let limit_cycle::Options { sequences, steps } = limit_cycle::Options::default();
                 (sequences, steps)
             }
+            Self::Interact => interactions::size(),
         }
     }
 }
@@ -91,7 +93,10 @@ impl Data {
             let path: PathBuf = folder.join(&*file);
             *file = std::path::absolute(&path).map_err(|error| Failure::disk("find", &path, error))?;
         }
-        let by_default = if self.task.is_some() { ScalingName::None } else { ScalingName::Fit };
+        let by_default = match self.task {
+            None | Some(TaskName::Interact) => ScalingName::Fit,
+            Some(_) => ScalingName::None,
+        };
         self.scaling.get_or_insert(ScalingChoice::Named(by_default));
         Ok(())
     }

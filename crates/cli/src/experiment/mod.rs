@@ -47,7 +47,7 @@ fn one() -> u64 {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Data {
-    /// A task of the thesis' chapter 3. Its data are made anew for each run, the same for the same seed.
+    /// A task of the thesis. Its data are made anew for each run, the same for the same seed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub task: Option<TaskName>,
     /// Number of sequences of the task. Default: as in the thesis.
@@ -72,13 +72,13 @@ pub struct Data {
     /// Names of the channels to learn, in this order. Default: all that the files have.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub channels: Option<Vec<String>>,
-    /// How samples are brought into the reach of the mean units, which is -1 to 1. Default: "fit" for files, "none" for
-    /// tasks.
+    /// How samples are brought into the reach of the mean units, which is -1 to 1. Default: "fit" for files and robots,
+    /// "none" for other tasks.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scaling: Option<ScalingChoice>,
 }
 
-/// The tasks of the thesis' chapter 3.
+/// The tasks of the thesis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum TaskName {
@@ -90,6 +90,8 @@ pub enum TaskName {
     Sinusoid,
     /// A random dynamical system with noise whose variance depends on its state (3.8-3.12)
     LimitCycle,
+    /// Two robots in a simulated world: one moves an object left and right, the other follows (5.2)
+    Interact,
 }
 
 /// How samples are scaled.

@@ -42,7 +42,9 @@ impl ReactionRule {
     pub fn time(&self, errors: &[f64], branch: usize) -> usize {
         let from = branch.min(errors.len());
         let errors = &errors[from..(from + self.longest).min(errors.len())];
-        let Some(onset) = errors.iter().take(self.onset).position(|e| !(*e < self.threshold)) else { return 0 };
+        let Some(onset) = errors.iter().take(self.onset).position(|e| *e >= self.threshold || e.is_nan()) else {
+            return 0;
+        };
         let settled = self.settled.max(1);
         let calm = errors[onset..].windows(settled).position(|steps| steps.iter().all(|e| *e < self.threshold));
         calm.map_or(self.longest, |wait| onset + wait)

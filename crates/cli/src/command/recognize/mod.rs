@@ -1,4 +1,13 @@
-//! `scrnn recognize`: which initial state makes the network predict a sequence best (thesis 2.9)?
+//! `scrnn recognize`: which initial state makes the network predict a sequence best (thesis 2.9)? With `--online`: which
+//! internal state explains what just happened (thesis 2.10.2)?
+
+mod deadline;
+mod online;
+mod regression;
+mod stream;
+
+pub use deadline::Latency;
+pub use regression::RegressionArguments;
 
 use std::path::PathBuf;
 
@@ -17,6 +26,7 @@ use crate::files::{self, Field};
 use crate::output;
 use crate::table::Table;
 use crate::trained::Trained;
+use online::{How, Online};
 
 /// How many of the learned sequences the table names.
 const NAMED: usize = 3;
@@ -27,17 +37,23 @@ const NAMED: usize = 3;
 /// learned states, and random ones around the mean. The table shows, for each sequence, the start that ended best, its
 /// log-likelihood (nats per step and channel, in scaled units), its error (3.5) in the data's units, and the learned
 /// sequences from whose own initial states the data are most likely.
+///
+/// With --online the network follows the samples one by one instead. Whenever one arrives, the internal state at the tail
+/// of a sliding window climbs the likelihood of the window, and the next samples are predicted anew. DATA `-` reads
+/// lines from the standard input and answers each at once.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   scrnn recognize runs/lissajous new.csv
   scrnn recognize runs/lissajous new.csv --starts 40 --out states.npz
   scrnn recognize runs/lissajous new.csv --observed 100 --completed whole.csv
-  scrnn generate runs/lissajous --initial-state states.npz")]
+  scrnn generate runs/lissajous --initial-state states.npz
+  scrnn recognize runs/interact new.csv --online --window 20 --steps 10 --deadline 5
+  robot | scrnn recognize runs/interact - --online --json | controller")]
 pub struct Arguments {
     /// A run folder or a checkpoint file
     run: PathBuf,
-    /// The sequences to recognise: .csv, .txt, .npy, .npz or .mcap
+    /// The sequences to recognise: .csv, .txt, .npy, .npz or .mcap; with --online also `-`, the standard input
     data: PathBuf,
     #[command(flatten)]
     part: Part,
@@ -59,7 +75,8 @@ pub struct Arguments {
     /// Use the run's best network instead of its newest
     #[arg(long)]
     best: bool,
-    /// Write the best initial states, for `scrnn generate --initial-state`
+    /// Write the best initial states, for `scrnn generate --initial-state`; with --online, each sample as predicted and as
+    /// postdicted
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
     /// With --observed: write the sequences with their rest as predicted
@@ -68,6 +85,10 @@ pub struct Arguments {
     /// Print a JSON object
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    online: Online,
+    #[command(flatten)]
+    regression: RegressionArguments,
 }
 
 /// What was found for one sequence.
@@ -109,6 +130,14 @@ struct Tried {
 
 /// Recognises.
 pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
+    if arguments.online.wanted() {
+        let Arguments { run, data, part, best, rate, out, json, regression, .. } = arguments;
+        let how = How { regression, rate: *rate };
+        return online::run(&arguments.online, (run, *best), (data, part), (&how, out.as_deref(), *json), shared);
+    }
+    if arguments.regression.given() {
+        return Err(Failure::input("options of error regression go with --online", "add --online, or leave them out"));
+    }
     let trained = Trained::open(&arguments.run, arguments.best)?;
     let checkpoint = &trained.checkpoint;
     let part = arguments.part.of(&arguments.data, trained.selection());

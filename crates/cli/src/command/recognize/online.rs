@@ -3,17 +3,17 @@
 use std::fmt::Write as _;
 use std::io::{self, BufReader};
 use std::path::Path;
-use std::time::Duration;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use scrnn::dataset::{Dataset, Sequence};
-use scrnn::error_regression::{Ascent, ErrorRegression, ErrorRegressionOptions, Regression};
+use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions, Regression};
 use serde::Serialize;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::deadline::{Deadline, Latency};
+use super::regression::RegressionArguments;
 use super::stream::{Arrival, Stream};
-use crate::args::Shared;
+use crate::args::{Part, Shared};
 use crate::command::generate::unit_names;
 use crate::failure::{Ending, Failure, Result};
 use crate::files::{self, Field};
@@ -21,33 +21,13 @@ use crate::output;
 use crate::table::Table;
 use crate::trained::Trained;
 
-const HEADING: &str = "Options of --online";
-
-/// How to regress.
+/// How to follow.
 #[derive(Debug, Args)]
-#[command(next_help_heading = HEADING)]
+#[command(next_help_heading = "Options of --online")]
 pub struct Online {
     /// Follow the samples one by one: regress over a sliding window whenever one arrives, and predict the next
     #[arg(long, conflicts_with_all = ["observed", "completed", "starts", "epochs", "seed"])]
     online: bool,
-    /// Steps in the window
-    #[arg(long, value_name = "W", default_value_t = 20, requires = "online")]
-    window: usize,
-    /// Updates of the internal state for each sample
-    #[arg(long, value_name = "N", default_value_t = 10, requires = "online")]
-    steps: usize,
-    /// How the internal state is moved
-    #[arg(long, value_enum, requires = "online")]
-    optimiser: Option<Optimiser>,
-    /// Momentum of the ascent [default: 0.9]
-    #[arg(long, value_name = "M", requires = "online")]
-    momentum: Option<f64>,
-    /// Longest gradient; 0 leaves it as it is
-    #[arg(long, value_name = "NORM", requires = "online")]
-    max_norm: Option<f64>,
-    /// Milliseconds that each sample may take: updates that do not fit are left out
-    #[arg(long, value_name = "MS", requires = "online")]
-    deadline: Option<f64>,
     /// Samples to predict beyond the next one
     #[arg(long, value_name = "N", default_value_t = 10, requires = "online")]
     ahead: usize,
@@ -65,47 +45,16 @@ pub struct Online {
     at: Vec<usize>,
 }
 
-/// How the internal state is moved.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Optimiser {
-    /// Gradient ascent with momentum, as in the thesis
-    Momentum,
-    /// Adam
-    Adam,
-}
-
 impl Online {
     /// Whether it is asked for.
     pub fn wanted(&self) -> bool {
         self.online
     }
 
-    fn options(&self, rate: Option<f64>, trained: &Trained) -> Result<ErrorRegressionOptions> {
+    fn options(&self, how: &How<'_>, trained: &Trained) -> Result<ErrorRegressionOptions> {
         let channels = &trained.checkpoint.channels;
-        let mut options = ErrorRegressionOptions::new(channels.len());
-        options.window = self.window;
-        options.iterations = self.steps;
+        let mut options = how.regression.options(how.rate, channels.len())?;
         options.ahead = self.ahead;
-        let given = match (self.optimiser, self.momentum) {
-            (Some(Optimiser::Adam), Some(_)) => {
-                return Err(Failure::input("--momentum does not go with --optimiser adam", "leave one of them out"));
-            }
-            (Some(Optimiser::Momentum), momentum) | (None, momentum @ Some(_)) => {
-                Some(Ascent::Momentum { rate: THESIS_RATE / channels.len() as f64, momentum: momentum.unwrap_or(0.9) })
-            }
-            (Some(Optimiser::Adam), None) => Some(Ascent::Adam { rate: ADAM_RATE }),
-            (None, None) => None,
-        };
-        if let Some(ascent) = given {
-            (options.ascent, options.max_norm) = (ascent, None);
-        }
-        if let Some(given) = rate {
-            let (Ascent::Momentum { rate, .. } | Ascent::Adam { rate }) = &mut options.ascent;
-            *rate = given;
-        }
-        if let Some(norm) = self.max_norm {
-            options.max_norm = Some(norm).filter(|&norm| norm != 0.0);
-        }
         for (names, shares) in
             [(&self.closed_channels, &mut options.sensed), (&self.unheeded_channels, &mut options.heeded)]
         {
@@ -131,16 +80,292 @@ impl Online {
             }
         }
     }
+}
 
-    fn limit(&self) -> Result<Option<Duration>> {
-        let limit = |ms: f64| match ms > 0.0 {
-            true => Duration::try_from_secs_f64(ms / 1e3).ok(),
-            false => None,
-        };
-        match self.deadline.map(|ms| limit(ms).ok_or(ms)) {
-            None => Ok(None),
-            Some(Ok(limit)) => Ok(Some(limit)),
-            Some(Err(ms)) => Err(Failure::input(format!("--deadline is {ms}"), "give milliseconds, more than 0")),
+/// How to regress.
+#[derive(Debug, Clone, Copy)]
+pub struct How<'a> {
+    /// The options.
+    pub regression: &'a RegressionArguments,
+    /// The rate, if it was given.
+    pub rate: Option<f64>,
+}
+
+/// What became of one sample.
+#[derive(Debug, Serialize)]
+struct Observed {
+    /// Its number, from 1.
+    sample: usize,
+    /// Updates of the internal state.
+    iterations: usize,
+    /// Nats per step and channel of the window before and after; none without variance units.
+    ln_likelihood: Option<[f64; 2]>,
+    /// (3.5) over the window before and after, in scaled units.
+    error: Option<[f64; 2]>,
+    milliseconds: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    view: Option<View>,
+}
+
+/// The network's view at one moment, in the data's units: rows of channels, or of context units.
+#[derive(Debug, Serialize)]
+struct View {
+    /// Number of the window's first sample, from 1.
+    from: usize,
+    /// What the window now says about its samples.
+    postdicted: Vec<Vec<f64>>,
+    /// The contexts that go with them.
+    contexts: Vec<Vec<f64>>,
+    /// What is predicted of the samples to come.
+    predicted: Vec<Vec<f64>>,
+    variance: Vec<Vec<f64>>,
+}
+
+/// One sequence, whole.
+#[derive(Debug, Serialize)]
+struct Followed {
+    sequence: String,
+    samples: usize,
+    /// Averages over all samples.
+    ln_likelihood: Option<[f64; 2]>,
+    error: [f64; 2],
+    /// (3.5) of each sample against what it was predicted as just before, in the data's units.
+    prediction_error: f64,
+    latency: Option<Latency>,
+    steps: Vec<Observed>,
+    #[serde(skip)]
+    rows: Rows,
+}
+
+/// What goes into a file: a row for each sample from the first predicted one on.
+#[derive(Debug, Default)]
+struct Rows {
+    mean: Vec<f64>,
+    variance: Vec<f64>,
+    postdicted: Vec<f64>,
+    context: Vec<f64>,
+}
+
+/// A network that follows one sequence.
+struct Session<'a> {
+    trained: &'a Trained,
+    regression: ErrorRegression,
+    deadline: Deadline,
+    taken: usize,
+    scaled: Vec<f64>,
+}
+
+impl<'a> Session<'a> {
+    fn new(online: &Online, how: &How<'_>, trained: &'a Trained, shared: &Shared) -> Result<Self> {
+        let options = online.options(how, trained)?;
+        let start = online.start(trained)?;
+        let regression = ErrorRegression::new(&trained.network(), start, options, shared.instruction_set())?;
+        let (deadline, scaled) = (how.regression.clock()?, vec![0.0; trained.checkpoint.channels.len()]);
+        Ok(Self { trained, regression, deadline, taken: 0, scaled })
+    }
+
+    fn observe(&mut self, sample: &[f64]) -> Result<Regression> {
+        let scaling = &self.trained.checkpoint.scaling;
+        for (channel, (scaled, raw)) in self.scaled.iter_mut().zip(sample).enumerate() {
+            *scaled = scaling.to_scaled(channel, *raw);
+        }
+        self.taken += 1;
+        let (regression, scaled) = (&mut self.regression, &self.scaled);
+        Ok(self.deadline.sample(|go_on| regression.observe(scaled, go_on))?)
+    }
+
+    fn told(&self, done: &Regression, view: bool, ahead: usize) -> Observed {
+        let values = (done.steps * self.scaled.len()) as f64;
+        let has_variance = self.trained.checkpoint.topology.has_variance();
+        let regressed = done.iterations > 0;
+        Observed {
+            sample: self.taken,
+            iterations: done.iterations,
+            ln_likelihood: (regressed && has_variance).then(|| done.ln_likelihood.map(|sum| sum / values)),
+            error: regressed.then(|| done.squared_error.map(|sum| sum / (2.0 * values))),
+            milliseconds: 1e3 * self.deadline.last().as_secs_f64(),
+            view: view.then(|| self.view(ahead)),
         }
     }
+
+    fn view(&self, ahead: usize) -> View {
+        let scaling = &self.trained.checkpoint.scaling;
+        let raw = |mean: &[f64]| mean.iter().enumerate().map(|(i, &y)| scaling.to_raw(i, y)).collect::<Vec<_>>();
+        let raw_variance =
+            |v: &[f64]| v.iter().enumerate().map(|(i, &v)| scaling.variance_to_raw(i, v)).collect::<Vec<_>>();
+        let window = self.regression.window();
+        let predicts = self.taken >= self.trained.checkpoint.topology.delay();
+        let future = if predicts { 0..ahead + 1 } else { 0..0 };
+        let has_variance = self.trained.checkpoint.topology.has_variance();
+        View {
+            from: self.taken + 1 - window,
+            postdicted: (0..window).map(|k| raw(self.regression.postdicted_mean(k))).collect(),
+            contexts: (0..window).map(|k| self.regression.context(k).to_vec()).collect(),
+            predicted: future.clone().map(|k| raw(self.regression.foreseen_mean(k))).collect(),
+            variance: match has_variance {
+                true => future.map(|k| raw_variance(self.regression.foreseen_variance(k))).collect(),
+                false => Vec::new(),
+            },
+        }
+    }
+}
+
+/// Follows recorded sequences, or a stream on the standard input.
+pub fn run(
+    online: &Online,
+    (run, best): (&Path, bool),
+    (data, part): (&Path, &Part),
+    (how, out, as_json): (&How<'_>, Option<&Path>, bool),
+    shared: &Shared,
+) -> Result<Ending> {
+    let trained = Trained::open(run, best)?;
+    if data == Path::new("-") {
+        if out.is_some() || !online.at.is_empty() {
+            return Err(Failure::input("--out and --at do not go with a stream", "it is printed as it comes"));
+        }
+        return stream(online, how, &trained, as_json, shared);
+    }
+    let data = files::read_part(data, &part.of(data, trained.selection())).map_err(Failure::from).and_then(|set| {
+        trained.check_channels(&set, data)?;
+        Ok(set)
+    })?;
+    let mut followed = Vec::new();
+    for sequence in data.sequences() {
+        followed.push(follow(online, how, &trained, sequence, shared)?);
+    }
+    if let Some(path) = out {
+        write(path, &trained, &followed)?;
+    }
+    if as_json {
+        output::print_json_line(&json!({ "sequences": followed }))?;
+    } else {
+        output::print(&table(&followed))?;
+    }
+    Ok(Ending::Done)
+}
+
+fn follow(online: &Online, how: &How<'_>, trained: &Trained, sequence: &Sequence, shared: &Shared) -> Result<Followed> {
+    let mut session = Session::new(online, how, trained, shared)?;
+    let (scaling, delay) = (&trained.checkpoint.scaling, trained.checkpoint.topology.delay());
+    let (mut steps, mut rows) = (Vec::with_capacity(sequence.len()), Rows::default());
+    let (mut squares, mut values) = (0.0, 0_usize);
+    for k in 0..sequence.len() {
+        let sample = sequence.sample(k);
+        if k >= delay {
+            for (i, &y) in session.regression.mean().iter().enumerate() {
+                rows.mean.push(scaling.to_raw(i, y));
+                squares += (scaling.to_raw(i, y) - sample[i]).powi(2);
+                values += 1;
+            }
+            let v = session.regression.variance().iter().enumerate();
+            rows.variance.extend(v.map(|(i, &v)| scaling.variance_to_raw(i, v)));
+        }
+        let done = session.observe(sample)?;
+        if k >= delay {
+            let last = session.regression.window() - 1;
+            let postdicted = session.regression.postdicted_mean(last).iter().enumerate();
+            rows.postdicted.extend(postdicted.map(|(i, &y)| scaling.to_raw(i, y)));
+            rows.context.extend_from_slice(session.regression.context(last));
+        }
+        steps.push(session.told(&done, online.at.contains(&(k + 1)), online.ahead));
+    }
+    let mean = |of: &dyn Fn(&Observed) -> Option<[f64; 2]>| {
+        let pairs: Vec<[f64; 2]> = steps.iter().filter_map(of).collect();
+        let n = pairs.len() as f64;
+        (!pairs.is_empty()).then(|| [0, 1].map(|k| pairs.iter().map(|pair| pair[k]).sum::<f64>() / n))
+    };
+    Ok(Followed {
+        sequence: sequence.name.clone(),
+        samples: sequence.len(),
+        ln_likelihood: mean(&|step| step.ln_likelihood),
+        error: mean(&|step| step.error).unwrap_or_default(),
+        prediction_error: squares / (2.0 * values.max(1) as f64),
+        latency: session.deadline.latency(),
+        steps,
+        rows,
+    })
+}
+
+/// One line of output for each line of input.
+fn stream(online: &Online, how: &How<'_>, trained: &Trained, as_json: bool, shared: &Shared) -> Result<Ending> {
+    let channels = &trained.checkpoint.channels;
+    let mut lines = Stream::new(BufReader::new(io::stdin()), channels);
+    let mut session = Session::new(online, how, trained, shared)?;
+    if !as_json {
+        output::print(&format!("sample,iterations,milliseconds,{}\n", channels.join(",")))?;
+    }
+    while let Some(arrival) = lines.next()? {
+        let Arrival::Sample(sample) = arrival else {
+            session = Session::new(online, how, trained, shared)?;
+            continue;
+        };
+        let done = session.observe(&sample)?;
+        let told = session.told(&done, true, online.ahead);
+        if as_json {
+            output::print_json_line(&told)?;
+            continue;
+        }
+        let mut line = format!("{},{},{:.3}", told.sample, told.iterations, told.milliseconds);
+        let next = told.view.as_ref().and_then(|view| view.predicted.first());
+        for channel in 0..channels.len() {
+            match next {
+                Some(next) => write!(line, ",{:?}", next[channel]).expect("a string takes all"),
+                None => line.push(','),
+            }
+        }
+        output::print(&(line + "\n"))?;
+    }
+    if let Some(latency) = session.deadline.latency() {
+        shared.say(told_latency(&latency));
+    }
+    Ok(Ending::Done)
+}
+
+/// Each sample as predicted just before it came and as the window has it afterwards, in the data's units.
+fn write(path: &Path, trained: &Trained, followed: &[Followed]) -> Result<()> {
+    let channels = &trained.checkpoint.channels;
+    let units: Vec<String> = trained.checkpoint.topology.groups().iter().flat_map(unit_names).collect();
+    let field = |names: &[String], of: &dyn Fn(&Rows) -> &Vec<f64>| -> Result<Dataset> {
+        let rows = followed.iter().map(|one| Sequence::new(one.sequence.clone(), names.len(), of(&one.rows).clone()));
+        Ok(Dataset::new(names.to_vec(), rows.collect::<scrnn::error::Result<_>>()?)?)
+    };
+    let mut fields = vec![("mean", field(channels, &|rows| &rows.mean)?)];
+    if trained.checkpoint.topology.has_variance() {
+        fields.push(("variance", field(channels, &|rows| &rows.variance)?));
+    }
+    fields.push(("postdicted", field(channels, &|rows| &rows.postdicted)?));
+    fields.push(("context", field(&units, &|rows| &rows.context)?));
+    let fields: Vec<Field<'_>> = fields.iter().map(|(name, data)| Field { name, data }).collect();
+    Ok(files::write(path, &fields)?)
+}
+
+fn table(followed: &[Followed]) -> String {
+    let pair = |pair: [f64; 2], digits: usize| format!("{:.digits$} -> {:.digits$}", pair[0], pair[1]);
+    let deadline = followed.iter().any(|one| one.latency.is_some_and(|latency| latency.missed.is_some()));
+    let mut head =
+        vec!["sequence", "samples", "ln L in the window", "error of prediction", "median ms", "99 % ms", "longest ms"];
+    if deadline {
+        head.push("missed");
+    }
+    let mut table = Table::new(&head);
+    for one in followed {
+        let mut row = vec![
+            one.sequence.clone(),
+            one.samples.to_string(),
+            one.ln_likelihood.map_or("-".to_owned(), |found| pair(found, 3)),
+            format!("{:.3e}", one.prediction_error),
+        ];
+        if let Some(Latency { median, p99, longest, missed }) = one.latency {
+            row.extend([median, p99, longest].map(|ms| format!("{ms:.3}")));
+            row.extend(missed.map(|missed| missed.to_string()));
+        }
+        table.row(row);
+    }
+    table.to_string()
+}
+
+fn told_latency(latency: &Latency) -> String {
+    let Latency { median, p99, longest, missed } = latency;
+    let missed = missed.map_or(String::new(), |missed| format!(", {missed} missed the deadline"));
+    format!("{median:.3} ms a sample, 99 % within {p99:.3} ms, longest {longest:.3} ms{missed}")
 }

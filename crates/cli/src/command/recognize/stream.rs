@@ -109,12 +109,9 @@ mod tests {
     #[test]
     fn channels_are_found_by_name_or_place() {
         let samples = [Arrival::Sample(vec![1.0, 2.0]), Arrival::Gap, Arrival::Sample(vec![3.0, 4.0])];
-        for text in [
-            "1,2\n\n3,4\n",
-            "# noise\na,b\n1,2\n\n3 4",
-            "time;b;a\n0;2;1\n\n1;4;3\n",
-            "step\tx\ty\n1\t1\t2\n\n2\t3\t4",
-        ] {
+        for text in
+            ["1,2\n\n3,4\n", "# noise\na,b\n1,2\n\n3 4", "time;b;a\n0;2;1\n\n1;4;3\n", "step\tx\ty\n1\t1\t2\n\n2\t3\t4"]
+        {
             assert_eq!(all(text).unwrap(), samples, "{text:?}");
         }
     }

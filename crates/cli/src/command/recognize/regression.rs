@@ -1,0 +1,89 @@
+//! How to regress, as options of the command line.
+
+use std::time::Duration;
+
+use clap::{Args, ValueEnum};
+use scrnn::error_regression::{Ascent, ErrorRegressionOptions};
+
+use super::deadline::Deadline;
+use crate::failure::{Failure, Result};
+
+/// Options of error regression.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Error regression")]
+pub struct RegressionArguments {
+    /// Steps in the sliding window [default: 20]
+    #[arg(long, value_name = "W")]
+    window: Option<usize>,
+    /// Updates of the internal state for each sample [default: 10]
+    #[arg(long, value_name = "N")]
+    steps: Option<usize>,
+    /// How the internal state is moved [default: what is safe for most networks]
+    #[arg(long, value_enum)]
+    optimiser: Option<Optimiser>,
+    /// Momentum of the ascent [default: 0.9]
+    #[arg(long, value_name = "M")]
+    momentum: Option<f64>,
+    /// Longest gradient; 0 leaves it as it is
+    #[arg(long, value_name = "NORM")]
+    max_norm: Option<f64>,
+    /// Milliseconds that each sample may take: updates that do not fit are left out
+    #[arg(long, value_name = "MS")]
+    deadline: Option<f64>,
+}
+
+/// How the internal state is moved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Optimiser {
+    /// Gradient ascent with momentum, as in the thesis
+    Momentum,
+    /// Adam
+    Adam,
+}
+
+/// The momentum ascent's rate for one channel: divided by their number it is the one that the thesis' chapter 5 has.
+const THESIS_RATE: f64 = 1e-4;
+
+impl RegressionArguments {
+    /// Whether any of them was given.
+    pub fn given(&self) -> bool {
+        let Self { window, steps, optimiser, momentum, max_norm, deadline } = self;
+        window.or(*steps).is_some() || optimiser.is_some() || momentum.or(*max_norm).or(*deadline).is_some()
+    }
+
+    /// For a network on so many channels.
+    pub fn options(&self, rate: Option<f64>, channels: usize) -> Result<ErrorRegressionOptions> {
+        let mut options = ErrorRegressionOptions::new(channels);
+        options.window = self.window.unwrap_or(options.window);
+        options.iterations = self.steps.unwrap_or(options.iterations);
+        match (self.optimiser, self.momentum) {
+            (Some(Optimiser::Adam), Some(_)) => {
+                return Err(Failure::input("--momentum does not go with --optimiser adam", "leave one of them out"));
+            }
+            (Some(Optimiser::Momentum), _) | (None, Some(_)) => {
+                let momentum = self.momentum.unwrap_or(0.9);
+                (options.ascent, options.max_norm) =
+                    (Ascent::Momentum { rate: THESIS_RATE / channels as f64, momentum }, None);
+            }
+            (Some(Optimiser::Adam), None) => (options.ascent, options.max_norm) = (Ascent::Adam { rate: 0.05 }, None),
+            (None, None) => {}
+        }
+        if let Some(given) = rate {
+            let (Ascent::Momentum { rate, .. } | Ascent::Adam { rate }) = &mut options.ascent;
+            *rate = given;
+        }
+        if let Some(norm) = self.max_norm {
+            options.max_norm = Some(norm).filter(|&norm| norm != 0.0);
+        }
+        Ok(options)
+    }
+
+    /// The clock of the control loop.
+    pub fn clock(&self) -> Result<Deadline> {
+        let Some(ms) = self.deadline else { return Ok(Deadline::new(None)) };
+        match Duration::try_from_secs_f64(ms / 1e3) {
+            Ok(limit) if ms > 0.0 => Ok(Deadline::new(Some(limit))),
+            _ => Err(Failure::input(format!("--deadline is {ms}"), "give milliseconds, more than 0")),
+        }
+    }
+}

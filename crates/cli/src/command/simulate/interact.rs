@@ -1,0 +1,246 @@
+//! `scrnn simulate interact`: the self-robot follows the other one (thesis 5.3.2, 5.3.4).
+
+use std::path::PathBuf;
+
+use clap::Args;
+use scrnn::analysis::excursions::Side;
+use scrnn::dataset::{Dataset, Sequence};
+use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions};
+use scrnn_sim::follower::{Branch, Followed, Mind, Outcome, follow, with_own_arm};
+use scrnn_sim::interaction::{CHANNELS, Interaction, InteractionOptions, letters, parse_order, random_order};
+use serde::Serialize;
+use serde_json::json;
+
+use crate::args::Shared;
+use crate::command::recognize::{Latency, RegressionArguments};
+use crate::failure::{Ending, Failure, Result};
+use crate::files::{self, Field};
+use crate::interactions::{BRANCHES, Film};
+use crate::output;
+use crate::table::Table;
+use crate::trained::Trained;
+
+/// Two robots: the network follows the other robot's object with its arm
+///
+/// The head follows the object by itself; object and head are sensed, with the sensors' noise, and the arm goes to where
+/// the network predicts it. For each branching the table says how it went and after how many samples of 100 ms the
+/// arm was where it should be. With --ers the network revises its slow state by error regression while it acts.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  scrnn simulate interact runs/interaction_wide --order RLLLR --initial-state LLRRL
+  scrnn simulate interact runs/interaction_wide --order RLLLR --initial-state LLRRL --ers --mcap world.mcap")]
+pub struct Arguments {
+    /// A run folder or a checkpoint file
+    run: PathBuf,
+    /// Where the object goes, in letters L and R [default: drawn at random]
+    #[arg(long, value_name = "ORDER")]
+    order: Option<String>,
+    /// The state to start from: `corresponding` to the order, that of another learned order, or `mean`
+    #[arg(long, value_name = "STATE", default_value = "mean")]
+    initial_state: String,
+    /// Number of interactions, each with another order unless one is given, and other noise
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    trials: u32,
+    /// Seed of random orders and of the sensors' noise
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Regress on prediction errors
+    #[arg(long)]
+    ers: bool,
+    /// Rate of the ascent [default: one that suits most networks]
+    #[arg(long, value_name = "RATE")]
+    rate: Option<f64>,
+    #[command(flatten)]
+    regression: RegressionArguments,
+    /// Use the run's best network instead of its newest
+    #[arg(long)]
+    best: bool,
+    /// Write what was sensed, predicted and done at each sample: .csv, .txt or .npz
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Write a recording of the world
+    #[arg(long, value_name = "FILE")]
+    mcap: Option<PathBuf>,
+    /// Print a JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// One interaction.
+#[derive(Debug, Serialize)]
+struct Trial {
+    order: String,
+    initial_state: String,
+    branches: Vec<Branch>,
+    latency: Option<Latency>,
+    #[serde(skip)]
+    followed: Followed,
+}
+
+/// Simulates.
+pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
+    let trained = Trained::open(&arguments.run, arguments.best)?;
+    let checkpoint = &trained.checkpoint;
+    if checkpoint.channels.len() != CHANNELS.len() {
+        let message = format!("the network's channels are {}", checkpoint.channels.join(", "));
+        return Err(Failure::input(message, format!("an interaction has {}", CHANNELS.join(", "))));
+    }
+    let options = arguments.options(&trained)?;
+    let network = trained.network();
+    let mut film = match &arguments.mcap {
+        Some(_) => Some(Film::new(&[("run", &arguments.run.display().to_string())])?),
+        None => None,
+    };
+    let mut trials = Vec::new();
+    for trial in 0..u64::from(arguments.trials) {
+        let seed = arguments.seed.wrapping_add(trial << 32);
+        let order = match &arguments.order {
+            Some(text) => parse_order(text)?,
+            None => random_order(BRANCHES, 0.5, seed),
+        };
+        let (initial_state, state) = arguments.start(&trained, &order)?;
+        let mind = Mind {
+            network: &network,
+            scaling: &checkpoint.scaling,
+            initial_state: state,
+            instruction_set: shared.instruction_set(),
+        };
+        let mut interaction = Interaction::new(&order, &InteractionOptions::default(), seed)?;
+        let mut deadline = arguments.regression.clock()?;
+        if let Some(film) = &mut film {
+            film.begin(&letters(&order))?;
+        }
+        let mut failed = None;
+        let observe = |regression: &mut ErrorRegression, sample: &[f64]| {
+            deadline.sample(|go_on| regression.observe(sample, go_on))
+        };
+        let followed = follow(&mind, &options, &mut interaction, observe, |interaction, moment, _| {
+            let Some(film) = film.as_mut().filter(|_| failed.is_none()) else { return };
+            let scaling = &checkpoint.scaling;
+            let raw = |y: [f64; 8]| (0..8).map(|i| scaling.to_raw(i, y[i])).collect::<Vec<_>>();
+            let mean = moment.predicted.map(raw);
+            let variance: Vec<f64> =
+                moment.variance.iter().enumerate().map(|(i, &v)| scaling.variance_to_raw(i, v)).collect();
+            let variance = Some(variance.as_slice()).filter(|variance| !variance.is_empty());
+            failed = film.frame(interaction, &moment.sensed, mean.as_deref().map(|mean| (mean, variance))).err();
+        })?;
+        if let Some(failure) = failed {
+            return Err(failure);
+        }
+        let (order, branches) = (letters(&order), followed.branches.clone());
+        trials.push(Trial { order, initial_state, branches, latency: deadline.latency(), followed });
+    }
+    if let (Some(film), Some(path)) = (film, &arguments.mcap) {
+        film.write(path)?;
+    }
+    if let Some(path) = &arguments.out {
+        write(path, &trained, &trials)?;
+    }
+    if arguments.json {
+        let successes = share(&trials, |branch| branch.outcome == Outcome::Success);
+        let collisions = share(&trials, |branch| branch.collision.is_some());
+        output::print_json_line(&json!({ "trials": trials, "success": successes, "collision": collisions }))?;
+    } else {
+        output::print(&told(&trials))?;
+    }
+    Ok(Ending::Done)
+}
+
+impl Arguments {
+    fn options(&self, trained: &Trained) -> Result<ErrorRegressionOptions> {
+        let mut options = with_own_arm(self.regression.options(self.rate, trained.checkpoint.channels.len())?);
+        options.ahead = 0;
+        if !self.ers {
+            options.iterations = 0;
+        }
+        Ok(options)
+    }
+
+    /// The state to start from, and its name.
+    fn start<'a>(&self, trained: &'a Trained, order: &[Side]) -> Result<(String, &'a [f64])> {
+        let (learned, names) = (&trained.checkpoint.initial_states, &trained.checkpoint.sequences);
+        let wanted = match self.initial_state.as_str() {
+            "mean" => return Ok(("mean".to_owned(), learned.mean())),
+            "corresponding" => letters(order),
+            other => other.to_owned(),
+        };
+        // Data from several files have the file's name before that of the order.
+        let is = |name: &&String| name.as_str() == wanted || name.rsplit('/').next() == Some(wanted.as_str());
+        match names.iter().position(|name| is(&name)) {
+            Some(s) => Ok((wanted, learned.sequence(s))),
+            None => {
+                let help = format!("`mean`, `corresponding`, or one of {}", names.join(", "));
+                Err(Failure::input(format!("the network did not learn `{wanted}`"), help))
+            }
+        }
+    }
+}
+
+/// The share of branchings.
+fn share(trials: &[Trial], of: impl Fn(&Branch) -> bool) -> f64 {
+    let branches = || trials.iter().flat_map(|trial| &trial.branches);
+    branches().filter(|branch| of(branch)).count() as f64 / branches().count().max(1) as f64
+}
+
+fn told(trials: &[Trial]) -> String {
+    let mut table = Table::new(&["order", "started from", "branchings", "reaction, samples", "collisions"]);
+    for trial in trials {
+        let word = |branch: &Branch| match branch.outcome {
+            Outcome::Success => "success",
+            Outcome::Opposite => "opposite",
+            Outcome::Collision => "collision",
+            Outcome::Stayed => "stayed",
+        };
+        let list = |of: &dyn Fn(&Branch) -> String| trial.branches.iter().map(of).collect::<Vec<_>>().join(" ");
+        table.row(vec![
+            trial.order.clone(),
+            trial.initial_state.clone(),
+            list(&|branch| word(branch).to_owned()),
+            list(&|branch| branch.reaction_time.to_string()),
+            trial.branches.iter().filter(|branch| branch.collision.is_some()).count().to_string(),
+        ]);
+    }
+    let branches: usize = trials.iter().map(|trial| trial.branches.len()).sum();
+    let success = 100.0 * share(trials, |branch| branch.outcome == Outcome::Success);
+    let mut text = format!("{table}\n{success:.1} % of {branches} branchings succeeded\n");
+    let longest = trials.iter().filter_map(|trial| trial.latency).map(|latency| latency.p99).fold(0.0, f64::max);
+    let missed: usize = trials.iter().filter_map(|trial| trial.latency?.missed).sum();
+    let deadline = trials.iter().any(|trial| trial.latency.is_some_and(|latency| latency.missed.is_some()));
+    text += &format!("99 % of the control steps took {longest:.3} ms at most");
+    text += &if deadline { format!("; {missed} missed the deadline\n") } else { "\n".to_owned() };
+    text
+}
+
+/// Sensed, predicted, variance, contexts, arm error, hand.
+fn write(path: &std::path::Path, trained: &Trained, trials: &[Trial]) -> Result<()> {
+    let (checkpoint, n) = (&trained.checkpoint, CHANNELS.len());
+    let (scaling, delay) = (&checkpoint.scaling, checkpoint.topology.delay());
+    let moments = |trial: &Trial| trial.followed.moments.get(delay..).unwrap_or_default().to_vec();
+    let field = |names: Vec<String>, of: &dyn Fn(&scrnn_sim::follower::Moment) -> Vec<f64>| -> Result<Dataset> {
+        let rows = trials
+            .iter()
+            .map(|trial| Sequence::new(trial.order.clone(), names.len(), moments(trial).iter().flat_map(of).collect()));
+        let rows = rows.collect::<scrnn::error::Result<Vec<_>>>()?;
+        Ok(Dataset::new(names, rows)?)
+    };
+    let channels = || checkpoint.channels.clone();
+    let units = checkpoint.topology.groups().iter().flat_map(crate::command::generate::unit_names).collect();
+    let sensed = field(channels(), &|moment| moment.sensed.to_vec())?;
+    let mean = field(channels(), &|moment| {
+        let predicted = moment.predicted.unwrap_or_default();
+        (0..n).map(|i| scaling.to_raw(i, predicted[i])).collect()
+    })?;
+    let context = field(units, &|moment| moment.context.clone())?;
+    let state = field(vec!["arm_error".into(), "hand".into()], &|moment| vec![moment.error, moment.hand])?;
+    let mut fields = vec![("sensed", sensed), ("mean", mean)];
+    if checkpoint.topology.has_variance() {
+        let variance = field(channels(), &|moment| {
+            moment.variance.iter().enumerate().map(|(i, &v)| scaling.variance_to_raw(i, v)).collect()
+        })?;
+        fields.push(("variance", variance));
+    }
+    fields.extend([("context", context), ("", state)]);
+    let fields: Vec<Field<'_>> = fields.iter().map(|(name, data)| Field { name, data }).collect();
+    Ok(files::write(path, &fields)?)
+}
