@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 use clap::{Args, Parser, Subcommand};
 use scrnn::engine::{Engine, InstructionSet};
 
-use crate::command::{completions, data, generate, inspect, recognize, report, reproduce, train};
+use crate::command::{completions, data, generate, inspect, recognize, report, reproduce, simulate, train};
 use crate::failure::Result;
 use crate::files::Selection;
 
@@ -126,6 +126,7 @@ pub enum Command {
     Train(train::Arguments),
     Generate(generate::Arguments),
     Recognize(recognize::Arguments),
+    Simulate(simulate::Arguments),
     Reproduce(reproduce::Arguments),
     Report(report::Arguments),
     Inspect(inspect::Arguments),

@@ -31,6 +31,7 @@ fn main() -> ExitCode {
         Command::Train(arguments) => command::train::run(&arguments, &shared),
         Command::Generate(arguments) => command::generate::run(&arguments, &shared),
         Command::Recognize(arguments) => command::recognize::run(&arguments, &shared),
+        Command::Simulate(arguments) => command::simulate::run(&arguments, &shared),
         Command::Reproduce(arguments) => command::reproduce::run(&arguments, &shared),
         Command::Report(arguments) => command::report::run(&arguments, &shared),
         Command::Inspect(arguments) => command::inspect::run(&arguments, &shared),

@@ -8,4 +8,5 @@ pub mod recognize;
 pub mod report;
 pub mod reproduce;
 pub mod schema;
+pub mod simulate;
 pub mod train;

@@ -7,6 +7,7 @@ use scrnn::learning::{self, Optimiser, Plan};
 use scrnn::scaling::Scaling;
 use scrnn::tasks::{limit_cycle, lissajous, patterns, sinusoid};
 use scrnn::topology::{self, Prediction, Topology};
+use scrnn_sim::tutor::Tutoring;
 
 use super::{
     Adam, AdaptiveRate, Data, Experiment, Group, Momentum, OptimiserName, PriorStep, ScalingChoice, ScalingConstants,
@@ -16,6 +17,17 @@ use crate::failure::{Failure, Result};
 use crate::files::Selection;
 
 impl TaskName {
+    /// As it is written in experiment files and on the command line.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Lissajous => "lissajous",
+            Self::Patterns => "patterns",
+            Self::Sinusoid => "sinusoid",
+            Self::LimitCycle => "limit-cycle",
+            Self::Reach => "reach",
+        }
+    }
+
     /// Number of sequences and of samples in each, as in the thesis.
     pub fn size(self) -> (usize, usize) {
         match self {
@@ -34,6 +46,10 @@ impl TaskName {
             Self::LimitCycle => {
                 let limit_cycle::Options { sequences, steps } = limit_cycle::Options::default();
                 (sequences, steps)
+            }
+            Self::Reach => {
+                let Tutoring { sequences, samples, .. } = Tutoring::default();
+                (sequences, samples)
             }
         }
     }
@@ -86,12 +102,18 @@ impl Data {
             self.sequences.get_or_insert(sequences);
             self.steps.get_or_insert(steps);
             self.seed.get_or_insert(1);
+            if task == TaskName::Reach {
+                self.exact_positions.get_or_insert(false);
+            }
         }
         for file in self.files.iter_mut().flatten() {
             let path: PathBuf = folder.join(&*file);
             *file = std::path::absolute(&path).map_err(|error| Failure::disk("find", &path, error))?;
         }
-        let by_default = if self.task.is_some() { ScalingName::None } else { ScalingName::Fit };
+        let by_default = match self.task {
+            Some(task) if task != TaskName::Reach => ScalingName::None,
+            _ => ScalingName::Fit,
+        };
         self.scaling.get_or_insert(ScalingChoice::Named(by_default));
         Ok(())
     }

@@ -47,18 +47,22 @@ fn one() -> u64 {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Data {
-    /// A task of the thesis' chapter 3. Its data are made anew for each run, the same for the same seed.
+    /// A task of the thesis' chapters 3 and 4. Its data are made anew for each run, the same for the same seed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub task: Option<TaskName>,
     /// Number of sequences of the task. Default: as in the thesis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sequences: Option<usize>,
-    /// Samples in each sequence of the task. Default: as in the thesis, 1000.
+    /// Samples in each sequence of the task. Default: as in the thesis, 1000, or 180 for "reach".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub steps: Option<usize>,
     /// Seed of the task's noise. Default 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
+    /// For the task "reach": whether the object lies exactly at its three positions, instead of being placed up to 10 mm
+    /// off for each sequence. Default false.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exact_positions: Option<bool>,
     /// Files to read, relative to the experiment file: .csv, .txt, .npy, .npz or .mcap. The sequences of all of them are
     /// learned together.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -72,13 +76,13 @@ pub struct Data {
     /// Names of the channels to learn, in this order. Default: all that the files have.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub channels: Option<Vec<String>>,
-    /// How samples are brought into the reach of the mean units, which is -1 to 1. Default: "fit" for files, "none" for
-    /// tasks.
+    /// How samples are brought into the reach of the mean units, which is -1 to 1. Default: "fit" for files and
+    /// "reach", "none" for other tasks.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scaling: Option<ScalingChoice>,
 }
 
-/// The tasks of the thesis' chapter 3.
+/// The tasks of the thesis' chapters 3 and 4.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum TaskName {
@@ -90,6 +94,8 @@ pub enum TaskName {
     Sinusoid,
     /// A random dynamical system with noise whose variance depends on its state (3.8-3.12)
     LimitCycle,
+    /// NAO's head and arm, as a tutor teaches it to touch a sphere, in simulation (thesis 4.2)
+    Reach,
 }
 
 /// How samples are scaled.

@@ -1,0 +1,31 @@
+//! `scrnn simulate`: a trained network drives a robot in a simulated world (thesis, chapters 4 and 5).
+
+mod reach;
+
+use clap::{Args, Subcommand};
+
+use crate::args::Shared;
+use crate::failure::{Ending, Result};
+
+/// Let a trained network drive a simulated robot
+///
+/// The robot is NAO, its world is simulated by rapier, many times faster than real time. A recording of what happened opens
+/// in Foxglove and rerun.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    experiment: Name,
+}
+
+/// The experiments.
+#[derive(Debug, Subcommand)]
+enum Name {
+    Reach(reach::Arguments),
+}
+
+/// Simulates.
+pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
+    match &arguments.experiment {
+        Name::Reach(arguments) => reach::run(arguments, shared),
+    }
+}
