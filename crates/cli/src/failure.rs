@@ -148,6 +148,21 @@ impl Failure {
     }
 }
 
+impl From<scrnn_sim::error::Error> for Failure {
+    fn from(error: scrnn_sim::error::Error) -> Self {
+        match error {
+            scrnn_sim::error::Error::Network(error) => error.into(),
+            other => Self::input(other.to_string(), ""),
+        }
+    }
+}
+
+impl From<scrnn_sim::recording::RecordingError> for Failure {
+    fn from(error: scrnn_sim::recording::RecordingError) -> Self {
+        Self::input(format!("the recording cannot be made: {error}"), "")
+    }
+}
+
 /// The library counts from 0, the program from 1 as the thesis does.
 impl From<scrnn::error::Error> for Failure {
     fn from(error: scrnn::error::Error) -> Self {

@@ -4,6 +4,8 @@
 //! ahead of the robot. The head keeps the sphere in the centre of its lower camera, whatever the arm does.
 
 use nalgebra::{Isometry3, Point3, Vector3};
+use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
 
 use crate::error::{Error, Result};
 use crate::gaze::Gaze;
@@ -43,6 +45,9 @@ const TOUCHING: [[f64; 4]; 3] =
 
 /// From a touching arm to the middle of the postures after retraction.
 pub const RETRACTION: [f64; 4] = [-0.60, -0.25, 0.70, -0.55];
+
+/// Sets the numbers of drawn places apart from a seed's others.
+const PLACES: u64 = 0x706C_6163_6573;
 
 /// Height of the torso's origin over the floor, of a standing NAO.
 const STANDING: f64 = 0.333_09;
@@ -218,4 +223,11 @@ pub fn retracted_arm(robot: &Robot, y: f64) -> Result<[f64; 4]> {
 /// Those of a robot without NAO's head.
 pub fn gaze_at(robot: &Robot, y: f64) -> Result<[f64; 2]> {
     Ok(Gaze::new(robot, "camera_bottom")?.fixate(&sphere_at(y)))
+}
+
+/// Places drawn evenly between positions 1 and 3.
+#[must_use]
+pub fn places_between(seed: u64, count: usize) -> Vec<f64> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed ^ PLACES);
+    (0..count).map(|_| random.random_range(POSITIONS[0]..POSITIONS[2])).collect()
 }

@@ -13,6 +13,7 @@ use scrnn::dataset::{Dataset, Sequence};
 use crate::channels::REACHING;
 use crate::error::{Error, Result};
 use crate::nao;
+use crate::parallel::in_parallel;
 use crate::reaching::{CYCLE, CYCLES, PERIOD, POSITIONS, RETRACTION, Stage, samples_to_steps, touching_arm};
 use crate::robot::Robot;
 use crate::touching::{Cycle, Watch};
@@ -84,11 +85,24 @@ pub struct Demonstration {
 /// # Errors
 /// [`Error::Setting`] for nothing to demonstrate, or a placement beyond the bench.
 pub fn demonstrate(tutoring: &Tutoring, seed: u64, threads: usize) -> Result<Vec<Demonstration>> {
+    let all = demonstrate_and_look(tutoring, seed, threads, &|_, _| ())?;
+    Ok(all.into_iter().map(|(demonstration, _)| demonstration).collect())
+}
+
+/// The same, with what `look` makes of the stage and of what the robot senses at each sample.
+///
+/// # Errors
+/// As [`demonstrate`].
+pub fn demonstrate_and_look<T: Send>(
+    tutoring: &Tutoring,
+    seed: u64,
+    threads: usize,
+    look: &(dyn Fn(&Stage, &[f64]) -> T + Sync),
+) -> Result<Vec<(Demonstration, Vec<T>)>> {
     let Tutoring { sequences, samples, placement, .. } = tutoring;
-    let needed = "at least 1";
     for (what, count) in [("the number of demonstrations", *sequences), ("samples of a demonstration", *samples)] {
         if count == 0 {
-            return Err(Error::Setting { what, found: "0".to_owned(), needed });
+            return Err(Error::Setting { what, found: "0".to_owned(), needed: "at least 1" });
         }
     }
     if !(0.0..=0.02).contains(placement) {
@@ -96,26 +110,7 @@ pub fn demonstrate(tutoring: &Tutoring, seed: u64, threads: usize) -> Result<Vec
         return Err(Error::Setting { what: "the placement's error", found, needed: "0 to 0.02 m" });
     }
     let robot = nao::load_one_armed()?;
-    let next = std::sync::atomic::AtomicUsize::new(0);
-    let work = || {
-        let mut done = Vec::new();
-        loop {
-            let sequence = next.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-            if sequence >= *sequences {
-                return done;
-            }
-            done.push((sequence, demonstration(tutoring, &robot, seed, sequence, &mut |_, _| Ok(()))));
-        }
-    };
-    let mut all: Vec<(usize, Result<Demonstration>)> = std::thread::scope(|scope| {
-        let running: Vec<_> = (0..threads.clamp(1, *sequences)).map(|_| scope.spawn(work)).collect();
-        let join = |thread: std::thread::ScopedJoinHandle<'_, _>| {
-            thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-        };
-        running.into_iter().flat_map(join).collect::<Vec<_>>()
-    });
-    all.sort_by_key(|(sequence, _)| *sequence);
-    all.into_iter().map(|(_, demonstration)| demonstration).collect()
+    in_parallel(*sequences, threads, |sequence| demonstration(tutoring, &robot, seed, sequence, look))
 }
 
 /// The demonstrations as sequences to learn, named after position and take, e.g. `2-07`.
@@ -131,17 +126,14 @@ pub fn dataset(demonstrations: &[Demonstration]) -> Result<Dataset> {
     Ok(Dataset::new(REACHING.map(str::to_owned).to_vec(), sequences)?)
 }
 
-/// Gives one demonstration. `observer` sees the stage at every sample, with what the robot sensed.
-///
-/// # Errors
-/// Those of the stage, and the observer's.
-pub fn demonstration<E: From<Error>>(
+/// Gives one demonstration.
+fn demonstration<T>(
     tutoring: &Tutoring,
     robot: &Robot,
     seed: u64,
     sequence: usize,
-    observer: &mut dyn FnMut(&Stage, &[f64]) -> std::result::Result<(), E>,
-) -> std::result::Result<Demonstration, E> {
+    look: &dyn Fn(&Stage, &[f64]) -> T,
+) -> Result<(Demonstration, Vec<T>)> {
     let mut random = ChaCha8Rng::seed_from_u64(seed ^ DOMAIN);
     random.set_stream(sequence as u64);
     let position = sequence % POSITIONS.len();
@@ -155,18 +147,19 @@ pub fn demonstration<E: From<Error>>(
     let steps = samples_to_steps(&tutoring.world)?;
     let mut watch = Watch::default();
     let mut samples = Vec::with_capacity(tutoring.samples * REACHING.len());
+    let mut seen = Vec::with_capacity(tutoring.samples);
     for sample in 0..tutoring.samples {
         let noise = [HEAD_NOISE, HEAD_NOISE, ARM_NOISE, ARM_NOISE, ARM_NOISE, ARM_NOISE];
         let sensed: Vec<f64> =
             stage.angles().iter().zip(noise).map(|(angle, noise)| angle + noise * normal(&mut random)).collect();
-        observer(&stage, &sensed)?;
+        seen.push(look(&stage, &sensed));
         samples.extend(sensed);
         for step in 1..=steps {
             stage.step(&path.at((sample as f64 + step as f64 / steps as f64) * PERIOD));
             watch.observe(stage.moment());
         }
     }
-    Ok(Demonstration { position, y, samples, cycles: watch.finish() })
+    Ok((Demonstration { position, y, samples, cycles: watch.finish() }, seen))
 }
 
 fn normal(random: &mut impl Rng) -> f64 {

@@ -7,6 +7,7 @@ use scrnn::learning::{self, Optimiser, Plan};
 use scrnn::scaling::Scaling;
 use scrnn::tasks::{limit_cycle, lissajous, patterns, sinusoid};
 use scrnn::topology::{self, Prediction, Topology};
+use scrnn_sim::tutor::Tutoring;
 
 use super::{
     Adam, AdaptiveRate, Data, Experiment, Group, Momentum, OptimiserName, PriorStep, ScalingChoice, ScalingConstants,
@@ -17,6 +18,23 @@ use crate::files::Selection;
 use crate::interactions;
 
 impl TaskName {
+    /// As it is written in experiment files and on the command line.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Lissajous => "lissajous",
+            Self::Patterns => "patterns",
+            Self::Sinusoid => "sinusoid",
+            Self::LimitCycle => "limit-cycle",
+            Self::Reach => "reach",
+            Self::Interact => "interact",
+        }
+    }
+
+    /// Whether a simulated robot makes the data.
+    pub fn has_robot(self) -> bool {
+        matches!(self, Self::Reach | Self::Interact)
+    }
+
     /// Number of sequences and of samples in each, as in the thesis.
     pub fn size(self) -> (usize, usize) {
         match self {
@@ -37,6 +55,10 @@ impl TaskName {
                 (sequences, steps)
             }
             Self::Interact => interactions::size(),
+            Self::Reach => {
+                let Tutoring { sequences, samples, .. } = Tutoring::default();
+                (sequences, samples)
+            }
         }
     }
 }
@@ -88,14 +110,17 @@ impl Data {
             self.sequences.get_or_insert(sequences);
             self.steps.get_or_insert(steps);
             self.seed.get_or_insert(1);
+            if task == TaskName::Reach {
+                self.exact_positions.get_or_insert(false);
+            }
         }
         for file in self.files.iter_mut().flatten() {
             let path: PathBuf = folder.join(&*file);
             *file = std::path::absolute(&path).map_err(|error| Failure::disk("find", &path, error))?;
         }
         let by_default = match self.task {
-            None | Some(TaskName::Interact) => ScalingName::Fit,
-            Some(_) => ScalingName::None,
+            Some(task) if !task.has_robot() => ScalingName::None,
+            _ => ScalingName::Fit,
         };
         self.scaling.get_or_insert(ScalingChoice::Named(by_default));
         Ok(())

@@ -53,12 +53,16 @@ pub struct Data {
     /// Number of sequences of the task. Default: as in the thesis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sequences: Option<usize>,
-    /// Samples in each sequence of the task. Default: as in the thesis, 1000.
+    /// Samples in each sequence of the task. Default: as in the thesis, 1000, or 180 for "reach".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub steps: Option<usize>,
     /// Seed of the task's noise. Default 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
+    /// For the task "reach": whether the object lies exactly at its three positions, instead of being placed up to 10 mm
+    /// off for each sequence. Default false.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exact_positions: Option<bool>,
     /// Files to read, relative to the experiment file: .csv, .txt, .npy, .npz or .mcap. The sequences of all of them are
     /// learned together.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -90,6 +94,8 @@ pub enum TaskName {
     Sinusoid,
     /// A random dynamical system with noise whose variance depends on its state (3.8-3.12)
     LimitCycle,
+    /// NAO's head and arm, as a tutor teaches it to touch a sphere, in simulation (thesis 4.2)
+    Reach,
     /// Two robots in a simulated world: one moves an object left and right, the other follows (5.2)
     Interact,
 }
