@@ -2,6 +2,10 @@
 
 #[path = "cli/experiments.rs"]
 mod experiments;
+#[path = "cli/extremes.rs"]
+mod extremes;
+#[path = "cli/recordings.rs"]
+mod recordings;
 #[path = "cli/refusals.rs"]
 mod refusals;
 #[path = "cli/reproducing.rs"]

@@ -1,5 +1,6 @@
 //! The command line: its commands, and the options that all of them share.
 
+use std::path::Path;
 use std::sync::LazyLock;
 
 use clap::{Args, Parser, Subcommand};
@@ -7,6 +8,7 @@ use scrnn::engine::{Engine, InstructionSet};
 
 use crate::command::{completions, data, generate, inspect, recognize, report, reproduce, simulate, train};
 use crate::failure::Result;
+use crate::files::Selection;
 
 static VERSION: LazyLock<String> =
     LazyLock::new(|| format!("{} (instruction set {})", env!("CARGO_PKG_VERSION"), InstructionSet::best()));
@@ -81,6 +83,38 @@ impl Shared {
     pub fn say(&self, message: impl std::fmt::Display) {
         if !self.quiet {
             eprintln!("{message}");
+        }
+    }
+}
+
+/// Which part of data files is meant.
+#[derive(Debug, Clone, Default, Args)]
+pub struct Part {
+    /// In .mcap files, the topic whose messages are samples [default: /sensed, or the only one that is JSON]
+    #[arg(long, value_name = "TOPIC")]
+    pub topic: Option<String>,
+    /// In .mcap files, bring the messages to samples this many seconds apart, on straight lines between them
+    #[arg(long, value_name = "SECONDS", value_parser = period)]
+    pub period: Option<f64>,
+    /// The channels to take, by their names [default: all]
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    pub channels: Option<Vec<String>>,
+}
+
+fn period(text: &str) -> std::result::Result<f64, String> {
+    let period: f64 = text.parse().map_err(|_| "give a number of seconds".to_owned())?;
+    if period > 0.0 && period.is_finite() { Ok(period) } else { Err("give a number of seconds above 0".to_owned()) }
+}
+
+impl Part {
+    /// What it selects in the file at `path`; where it is silent, what `learned` of its training's data says.
+    pub fn of(&self, path: &Path, learned: Option<Selection>) -> Selection {
+        let Selection { topic, period, channels } = learned.unwrap_or_default();
+        let recording = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"));
+        Selection {
+            topic: self.topic.clone().or(topic.filter(|_| recording)),
+            period: self.period.or(period.filter(|_| recording)),
+            channels: self.channels.clone().or(channels),
         }
     }
 }

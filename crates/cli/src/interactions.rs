@@ -11,10 +11,11 @@ use scrnn_sim::interaction::{
 };
 use scrnn_sim::joints::{HEAD, RIGHT_ARM};
 use scrnn_sim::nao;
-use scrnn_sim::recording::{Heading, Joint, Recorder, RecordingError, Robot};
+use scrnn_sim::parallel::in_parallel;
+use scrnn_sim::recording::{Heading, Joint, Recorder, Robot};
 
 use crate::failure::{Failure, Result};
-use crate::files;
+use crate::{files, source};
 
 /// Branchings of an order.
 pub const BRANCHES: usize = 5;
@@ -60,30 +61,7 @@ fn recorded(orders: &[Vec<Side>], seed: u64, steps: usize) -> Result<Vec<(Sequen
         })?;
         Ok((noisy, Sequence::new(letters(order), CHANNELS.len(), truth)?))
     };
-    let workers = std::thread::available_parallelism().map_or(1, usize::from);
-    let share = orders.len().div_ceil(workers).max(1);
-    let results: Vec<Result<Vec<(Sequence, Sequence)>>> = std::thread::scope(|scope| {
-        let one = &one;
-        let running: Vec<_> = orders
-            .chunks(share)
-            .enumerate()
-            .map(|(chunk, orders)| {
-                scope.spawn(move || {
-                    orders.iter().enumerate().map(|(k, order)| one(chunk * share + k, order)).collect::<Result<_>>()
-                })
-            })
-            .collect();
-        let join = |thread: std::thread::ScopedJoinHandle<'_, _>| thread.join();
-        running
-            .into_iter()
-            .map(|thread| join(thread).unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-            .collect()
-    });
-    let mut all = Vec::with_capacity(orders.len());
-    for result in results {
-        all.extend(result?);
-    }
-    Ok(all)
+    in_parallel(orders.len(), source::threads(), |k| one(k, &orders[k]))
 }
 
 /// Films the first orders.
@@ -166,18 +144,6 @@ impl Film {
 
 fn nanoseconds(seconds: f64) -> u64 {
     (seconds * 1e9).round() as u64
-}
-
-impl From<RecordingError> for Failure {
-    fn from(error: RecordingError) -> Self {
-        Self::input(error.to_string(), "")
-    }
-}
-
-impl From<scrnn_sim::error::Error> for Failure {
-    fn from(error: scrnn_sim::error::Error) -> Self {
-        Self::input(error.to_string(), "")
-    }
 }
 
 #[cfg(test)]

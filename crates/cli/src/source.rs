@@ -2,6 +2,7 @@
 
 use scrnn::dataset::Dataset;
 use scrnn::tasks::{Task, limit_cycle, lissajous, patterns, sinusoid};
+use scrnn_sim::tutor::{self, Demonstration, Tutoring};
 use sha2::{Digest, Sha256};
 
 use crate::experiment::{Data, TaskName};
@@ -15,6 +16,14 @@ pub struct Source {
     pub data: Dataset,
     /// The variance of each sample's noise, where it is known.
     pub truth: Option<Truth>,
+    /// What came of the movements that a robot was taught; empty where none was.
+    pub demonstrations: Vec<Demonstration>,
+}
+
+impl Source {
+    fn of(data: Dataset) -> Self {
+        Self { data, truth: None, demonstrations: Vec::new() }
+    }
 }
 
 /// The true variances of a task.
@@ -31,17 +40,24 @@ pub fn load(data: &Data) -> Result<Source> {
     if let Some(task) = data.task {
         let (sequences, steps) = task.size();
         let size = (data.sequences.unwrap_or(sequences), data.steps.unwrap_or(steps));
-        let Task { data, variances, .. } = make(task, size, data.seed.unwrap_or(1))?;
-        if task == TaskName::Interact {
-            // The sensors' noise is not all that cannot be foreseen: nobody knows the true variances.
-            return Ok(Source { data, truth: None });
+        let seed = data.seed.unwrap_or(1);
+        if task == TaskName::Reach {
+            let tutoring = tutoring(size, data.exact_positions.unwrap_or(false));
+            let demonstrations = tutor::demonstrate(&tutoring, seed, threads())?;
+            return Ok(Source {
+                demonstrations: demonstrations.clone(),
+                ..Source::of(tutor::dataset(&demonstrations)?)
+            });
         }
-        return Ok(Source { data, truth: Some(Truth { task, variances }) });
+        let Task { data, variances, .. } = make(task, size, seed)?;
+        // The noise of a robot's sensors is not all that cannot be foreseen: nobody knows the true variances.
+        let truth = (!task.has_robot()).then_some(Truth { task, variances });
+        return Ok(Source { truth, ..Source::of(data) });
     }
     let paths = data.files.as_deref().unwrap_or_default();
     let mut sets = Vec::with_capacity(paths.len());
     for path in paths {
-        sets.push((path, files::read(path)?));
+        sets.push((path, files::read_part(path, &data.selection())?));
     }
     let data = match sets.as_slice() {
         [(_, only)] => only.clone(),
@@ -71,16 +87,32 @@ pub fn load(data: &Data) -> Result<Source> {
             Dataset::new(channels, sequences)?
         }
     };
-    Ok(Source { data, truth: None })
+    Ok(Source::of(data))
 }
 
-/// The data of a task: so many sequences of so many samples.
+/// How the robot is taught: so many demonstrations of so many samples.
+pub fn tutoring((sequences, samples): (usize, usize), exact_positions: bool) -> Tutoring {
+    let usual = Tutoring::default();
+    let placement = if exact_positions { 0.0 } else { usual.placement };
+    Tutoring { sequences, samples, placement, ..usual }
+}
+
+/// Threads for worlds side by side; they change no bit of what comes of them.
+pub fn threads() -> usize {
+    std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
+}
+
+/// The data of a task of chapter 3: so many sequences of so many samples.
 pub fn make(task: TaskName, (sequences, steps): (usize, usize), seed: u64) -> Result<Task> {
     Ok(match task {
         TaskName::Lissajous => lissajous::generate(&lissajous::Options { sequences, steps }, seed)?,
         TaskName::Patterns => patterns::generate(&patterns::Options { sequences, steps }, seed)?,
         TaskName::Sinusoid => sinusoid::generate(&sinusoid::Options { sequences, steps }, seed)?,
         TaskName::LimitCycle => limit_cycle::generate(&limit_cycle::Options { sequences, steps }, seed)?.task,
+        TaskName::Reach => {
+            let message = "the demonstrations of the reaching task have no known truth";
+            return Err(Failure::input(message, "the tasks of chapter 3 have one"));
+        }
         TaskName::Interact => interactions::make((sequences, steps), seed)?,
     })
 }

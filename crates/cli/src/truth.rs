@@ -80,7 +80,9 @@ pub fn compare(
             };
             limit_cycle::State { y: last, z: 0.0 }.standard_deviation()
         }
-        TaskName::Lissajous | TaskName::Patterns | TaskName::Sinusoid | TaskName::Interact => of_data(s, k, i),
+        TaskName::Lissajous | TaskName::Patterns | TaskName::Sinusoid | TaskName::Reach | TaskName::Interact => {
+            of_data(s, k, i)
+        }
     };
     let correlate = |generated: &[Generated], true_sd: &dyn Fn(usize, usize, usize) -> f64| {
         let (mut predicted, mut expected) = (Vec::new(), Vec::new());

@@ -19,6 +19,10 @@ use crate::network::Network;
 use crate::packed::Packed;
 use crate::stepper::Stepper;
 
+mod running;
+
+pub use running::Running;
+
 /// What one channel's input is made of.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChannelFeedback {
@@ -110,13 +114,7 @@ pub fn generate(
         true => Ok(()),
         false => Err(Error::Length { what, found, needed }),
     };
-    length("the feedback".to_owned(), options.feedback.0.len(), n_x)?;
-    for channel in &options.feedback.0 {
-        if !(0.0..=1.0).contains(&channel.sensed) {
-            let found = channel.sensed.to_string();
-            return Err(Error::Setting { what: "the share of sensed input", found, needed: "a number from 0 to 1" });
-        }
-    }
+    check(&options.feedback, n_x)?;
     for (index, start) in starts.iter().enumerate() {
         length(format!("initial state {index}"), start.initial_state.len(), n_c)?;
         let whole = start.sensed.len().next_multiple_of(n_x);
@@ -136,6 +134,20 @@ pub fn generate(
         job.out = engine.instruction_set().run(Generate { packed, delay, floor, variance, options, starts, stream });
     });
     Ok(jobs.into_iter().flat_map(|job| job.out).collect())
+}
+
+/// Whether a feedback is one that a network of N_I channels can run with.
+fn check(feedback: &Feedback, n_x: usize) -> Result<()> {
+    if feedback.0.len() != n_x {
+        return Err(Error::Length { what: "the feedback".to_owned(), found: feedback.0.len(), needed: n_x });
+    }
+    match feedback.0.iter().find(|channel| !(0.0..=1.0).contains(&channel.sensed)) {
+        Some(bad) => {
+            let (what, found) = ("the share of sensed input", bad.sensed.to_string());
+            Err(Error::Setting { what, found, needed: "a number from 0 to 1" })
+        }
+        None => Ok(()),
+    }
 }
 
 struct Job<'a> {
@@ -178,14 +190,7 @@ impl WithSimd for Generate<'_> {
                 let input = stepper.input(packed, column);
                 let sensed = start.sensed.get(k * n_x..(k + 1) * n_x);
                 let predicted = k.checked_sub(delay).map(|from| &out[column].sample[from * n_x..(from + 1) * n_x]);
-                for (i, (x, rule)) in input.iter_mut().zip(&options.feedback.0).enumerate() {
-                    *x = match (sensed, predicted) {
-                        (Some(sensed), None) => sensed[i],
-                        (Some(sensed), Some(predicted)) => mix(rule.sensed, sensed[i], predicted[i]),
-                        (None, Some(predicted)) => predicted[i],
-                        (None, None) => 0.0,
-                    };
-                }
+                self::input(input, &options.feedback, sensed, predicted);
             }
             stepper.step(simd, packed);
             for (column, out) in out.iter_mut().enumerate() {
@@ -197,10 +202,7 @@ impl WithSimd for Generate<'_> {
                     if variance {
                         let v = precise[i] + floor;
                         out.variance.push(v);
-                        let z: f64 = StandardNormal.sample(&mut random[column]);
-                        if rule.noise {
-                            sample += v.sqrt() * z;
-                        }
+                        sample = draw(&mut random[column], y, v, rule.noise);
                     }
                     out.sample.push(sample);
                 }
@@ -211,6 +213,27 @@ impl WithSimd for Generate<'_> {
         }
         out
     }
+}
+
+/// Fills the input from what is sensed and what was predicted for it (2.25a), (2.25b); 0 without either.
+#[inline(always)]
+fn input(input: &mut [f64], feedback: &Feedback, sensed: Option<&[f64]>, predicted: Option<&[f64]>) {
+    for (i, (x, rule)) in input.iter_mut().zip(&feedback.0).enumerate() {
+        *x = match (sensed, predicted) {
+            (Some(sensed), None) => sensed[i],
+            (Some(sensed), Some(predicted)) => mix(rule.sensed, sensed[i], predicted[i]),
+            (None, Some(predicted)) => predicted[i],
+            (None, None) => 0.0,
+        };
+    }
+}
+
+/// y, with noise of variance v (2.26). A number is drawn even if it is not used: which channels have noise does not
+/// change the noise of others.
+#[inline(always)]
+fn draw(random: &mut ChaCha8Rng, y: f64, v: f64, noise: bool) -> f64 {
+    let z: f64 = StandardNormal.sample(random);
+    if noise { y + v.sqrt() * z } else { y }
 }
 
 /// `share` parts sensed, the rest predicted; the pure cases are exact.
@@ -233,7 +256,7 @@ mod tests {
     use crate::initialization::initialize;
     use crate::topology::{Group, Prediction, Topology};
 
-    fn network(delay: usize, floor: f64) -> Network {
+    pub(super) fn network(delay: usize, floor: f64) -> Network {
         let groups = vec![Group::fast(9, 2.0), Group::slow(4, 30.0)];
         let topology = Topology::new(2, delay, groups, Prediction::MeanAndVariance { floor }).unwrap();
         let mut network = initialize(&topology, 1, 4).0;
@@ -241,7 +264,7 @@ mod tests {
         network
     }
 
-    fn samples(count: usize) -> Vec<f64> {
+    pub(super) fn samples(count: usize) -> Vec<f64> {
         (0..2 * count).map(|k| 0.7 * (0.4 * k as f64).sin()).collect()
     }
 
@@ -249,7 +272,7 @@ mod tests {
         GenerationOptions { steps, feedback, seed: 9, contexts: true }
     }
 
-    const U0: [f64; 13] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.3, -0.2, 0.9, 0.1];
+    pub(super) const U0: [f64; 13] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.3, -0.2, 0.9, 0.1];
 
     fn close(a: &[f64], b: &[f64]) -> bool {
         a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-13)

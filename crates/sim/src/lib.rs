@@ -4,7 +4,9 @@
 //! Everything public is in nalgebra's types, metres, radians, seconds and newtons. Nothing here opens a file, prints, or
 //! reads a clock, and the same calls in the same order give the same bits.
 
+pub mod agent;
 pub mod camera;
+pub mod channels;
 pub mod error;
 pub mod follower;
 pub mod gaze;
@@ -12,9 +14,14 @@ pub mod interaction;
 pub mod joints;
 pub mod kinematics;
 pub mod nao;
+pub mod parallel;
+pub mod reaching;
+pub mod reaching_recording;
 pub mod recording;
 pub mod robot;
 pub mod scene;
+pub mod touching;
+pub mod tutor;
 pub mod world;
 
 mod articulation;

@@ -1,9 +1,13 @@
 //! `scrnn data`: the thesis' sequences as files.
 
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use scrnn::tasks::Task;
+use scrnn_sim::reaching::PERIOD;
+use scrnn_sim::reaching_recording::{Look, ReachingRecording};
+use scrnn_sim::tutor::{self, Demonstration};
 
 use crate::args::Shared;
 use crate::experiment::TaskName;
@@ -13,14 +17,17 @@ use crate::{interactions, output, source};
 
 /// Write the sequences of the thesis' experiments
 ///
-/// Samples go to FILE. What the noise hides, the true mean and variance of each sample, goes beside them into
-/// FILE.truth, so that FILE itself can be learned from: train with files = ["FILE"].
+/// Samples go to FILE, which can be learned from: train with files = ["FILE"]. What the noise of chapter 3 hides, the true
+/// mean and variance of each sample, goes beside them into FILE.truth. The task "reach" is taught to a simulated robot; as
+/// .mcap its demonstrations can be watched in Foxglove and rerun.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   scrnn data sinusoid                                    the samples as CSV on stdout
   scrnn data lissajous --seed 7 --out lissajous.npz      also writes lissajous.truth.npz
   scrnn data limit-cycle --sequences 3 --steps 200 --out three.csv
+  scrnn data reach --out reach.npz                       30 demonstrations, 10 at each position
+  scrnn data reach --sequences 3 --out reach.mcap        one of each, to look at
   scrnn data interact --out interact.npz                 two robots, all 32 orders, from the physics
   scrnn data interact --sequences 1 --out world.mcap     a recording to watch")]
 pub struct Arguments {
@@ -32,10 +39,13 @@ pub struct Arguments {
     /// Number of sequences [default: as in the thesis]
     #[arg(long, value_name = "N")]
     sequences: Option<usize>,
-    /// Samples in each sequence [default: as in the thesis, 1000 or 470]
+    /// Samples in each sequence [default: as in the thesis, 1000; 180 for reach, 470 for interact]
     #[arg(long, value_name = "N")]
     steps: Option<usize>,
-    /// Where to write the samples: .csv, .txt, .npy or .npz, and .mcap for robots. Without it, CSV on stdout
+    /// With reach: put the object exactly at its three positions, instead of up to 10 mm off
+    #[arg(long)]
+    exact_positions: bool,
+    /// Where to write the samples: .csv, .txt, .npy or .npz; with robots also .mcap. Without it, CSV on stdout
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Where to write the true means and variances [default: FILE with `.truth` before its extension]
@@ -47,13 +57,22 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     let (sequences, steps) = arguments.task.size();
     let size = (arguments.sequences.unwrap_or(sequences), arguments.steps.unwrap_or(steps));
-    if let Some(path) = arguments.out.as_deref().filter(|path| is_mcap(path)) {
-        if arguments.task != TaskName::Interact {
-            let message = format!("{} would be a recording of a world, and this task has none", path.display());
+    let film = arguments.out.as_deref().filter(|path| is_recording(path));
+    if arguments.exact_positions && arguments.task != TaskName::Reach {
+        let message = format!("--exact-positions does not go with {}", arguments.task.word());
+        return Err(Failure::input(message, "it is for the task reach"));
+    }
+    match (arguments.task, film) {
+        (TaskName::Reach, _) => return reach(arguments, size, shared),
+        (TaskName::Interact, Some(path)) => {
+            interactions::film(path, size, arguments.seed)?;
+            return Ok(Ending::Done);
+        }
+        (task, Some(path)) => {
+            let message = format!("{} would be a recording of a world, and {} has none", path.display(), task.word());
             return Err(Failure::input(message, "write .csv, .txt, .npy or .npz"));
         }
-        interactions::film(path, size, arguments.seed)?;
-        return Ok(Ending::Done);
+        (_, None) => {}
     }
     let Task { data, means, variances } = source::make(arguments.task, size, arguments.seed)?;
     let samples = [Field { name: "", data: &data }];
@@ -68,7 +87,45 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     Ok(Ending::Done)
 }
 
-fn is_mcap(path: &Path) -> bool {
+/// Lets the tutor teach, and writes what the robot sensed.
+fn reach(arguments: &Arguments, size: (usize, usize), shared: &Shared) -> Result<Ending> {
+    if arguments.truth.is_some() {
+        return Err(Failure::input("--truth does not go with reach", "nobody knows the truth about a tutor's hand"));
+    }
+    let tutoring = source::tutoring(size, arguments.exact_positions);
+    let threads = shared.engine()?.threads();
+    if let Some(path) = arguments.out.as_deref().filter(|path| is_recording(path)) {
+        let all = tutor::demonstrate_and_look(&tutoring, arguments.seed, threads, &Look::at)?;
+        let seed = arguments.seed.to_string();
+        files::replace(path, &recording(&all, &seed)?)?;
+        return Ok(Ending::Done);
+    }
+    let data = tutor::dataset(&tutor::demonstrate(&tutoring, arguments.seed, threads)?)?;
+    let samples = [Field { name: "", data: &data }];
+    match &arguments.out {
+        Some(path) => files::write(path, &samples)?,
+        None => output::print(&files::csv(&samples))?,
+    }
+    Ok(Ending::Done)
+}
+
+/// All demonstrations one after the other, a second apart.
+fn recording(all: &[(Demonstration, Vec<Look>)], seed: &str) -> Result<Vec<u8>> {
+    let names = tutor::dataset(&all.iter().map(|(one, _)| one.clone()).collect::<Vec<_>>())?;
+    let notes = [("task", "reach"), ("seed", seed)];
+    let mut recording = ReachingRecording::new(Cursor::new(Vec::new()), None, &notes)?;
+    let mut begin = 0.0;
+    for ((_, looks), sequence) in all.iter().zip(names.sequences()) {
+        recording.begin_sequence(begin, &sequence.name)?;
+        for look in looks {
+            recording.look(look)?;
+        }
+        begin += looks.len() as f64 * PERIOD + 1.0;
+    }
+    Ok(recording.finish()?.into_inner())
+}
+
+fn is_recording(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"))
 }
 

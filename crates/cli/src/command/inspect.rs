@@ -7,7 +7,7 @@ use scrnn::checkpoint::Checkpoint;
 use scrnn::dataset::{Dataset, Sequence};
 use serde_json::{Value, json};
 
-use crate::args::Shared;
+use crate::args::{Part, Shared};
 use crate::failure::{Ending, Result};
 use crate::notes::Score;
 use crate::table::Table;
@@ -24,6 +24,8 @@ Examples:
 pub struct Arguments {
     /// A run folder, a .safetensors file or a data file
     path: PathBuf,
+    #[command(flatten)]
+    part: Part,
     /// Print a JSON object
     #[arg(long)]
     json: bool,
@@ -37,7 +39,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         let trained = Trained::open(path, false)?;
         (network_object(&trained), network_text(&trained, path))
     } else {
-        let data = files::read(path)?;
+        let data = files::read_part(path, &arguments.part.of(path, None))?;
         (data_object(&data), data_text(&data, path))
     };
     if arguments.json {

@@ -1,6 +1,6 @@
 //! What the types of the experiment file cannot rule out. A complaint names its key, so that the reader can point at it.
 
-use super::{Adam, AdaptiveRate, Data, Experiment, Momentum, Network, Output, ScalingChoice};
+use super::{Adam, AdaptiveRate, Data, Experiment, Momentum, Network, Output, ScalingChoice, TaskName};
 
 /// A value that will not do.
 #[derive(Debug, PartialEq)]
@@ -59,7 +59,7 @@ fn check_data(data: &Data) -> Check {
             return complaint(
                 &["data"],
                 "there are no data to learn",
-                "task = \"sinusoid\" (or \"lissajous\", \"limit-cycle\"), or files = [\"mine.csv\"]",
+                "task = \"sinusoid\" (or \"lissajous\", \"limit-cycle\", \"reach\"), or files = [\"mine.csv\"]",
             );
         }
         (Some(_), Some(_)) => {
@@ -78,7 +78,31 @@ fn check_data(data: &Data) -> Check {
                 }
             }
         }
-        (Some(_), None) => {}
+        (Some(_), None) => {
+            let of_files = [
+                ("topic", data.topic.is_some()),
+                ("period", data.period.is_some()),
+                ("channels", data.channels.is_some()),
+            ];
+            for (key, given) in of_files {
+                if given {
+                    return complaint(&["data", key], format!("`data.{key}` does not go with `task`"), "leave it out");
+                }
+            }
+        }
+    }
+    if let Some(period) = data.period {
+        positive(&["data", "period"], period)?;
+    }
+    if let Some(channels) = &data.channels {
+        let path = ["data", "channels"];
+        must(!channels.is_empty(), &path, "empty", "at least one name")?;
+        let twice = channels.iter().enumerate().find(|(index, name)| channels[..*index].contains(name));
+        must(twice.is_none(), &path, "a list that names a channel twice", "each channel once")?;
+    }
+    if data.exact_positions.is_some() && data.task != Some(TaskName::Reach) {
+        let message = "`data.exact_positions` is given without the task \"reach\"";
+        return complaint(&["data", "exact_positions"], message, "leave it out");
     }
     must(data.sequences != Some(0), &["data", "sequences"], 0, "at least 1")?;
     must(data.steps != Some(0), &["data", "steps"], 0, "at least 1 more than the delay")?;

@@ -7,15 +7,34 @@ use scrnn::learning::{self, Optimiser, Plan};
 use scrnn::scaling::Scaling;
 use scrnn::tasks::{limit_cycle, lissajous, patterns, sinusoid};
 use scrnn::topology::{self, Prediction, Topology};
+use scrnn_sim::tutor::Tutoring;
 
 use super::{
-    Adam, AdaptiveRate, Data, Experiment, Group, Momentum, OptimiserName, PriorStep, ScalingChoice, ScalingConstants,
-    ScalingName, ScalingRanges, TaskName, Training,
+    Adam, AdaptiveRate, Data, Experiment, Group, Momentum, OnDivergence, OptimiserName, PriorStep, ScalingChoice,
+    ScalingConstants, ScalingName, ScalingRanges, TaskName, Training,
 };
 use crate::failure::{Failure, Result};
+use crate::files::Selection;
 use crate::interactions;
 
 impl TaskName {
+    /// As it is written in experiment files and on the command line.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Lissajous => "lissajous",
+            Self::Patterns => "patterns",
+            Self::Sinusoid => "sinusoid",
+            Self::LimitCycle => "limit-cycle",
+            Self::Reach => "reach",
+            Self::Interact => "interact",
+        }
+    }
+
+    /// Whether a simulated robot makes the data.
+    pub fn has_robot(self) -> bool {
+        matches!(self, Self::Reach | Self::Interact)
+    }
+
     /// Number of sequences and of samples in each, as in the thesis.
     pub fn size(self) -> (usize, usize) {
         match self {
@@ -36,6 +55,10 @@ impl TaskName {
                 (sequences, steps)
             }
             Self::Interact => interactions::size(),
+            Self::Reach => {
+                let Tutoring { sequences, samples, .. } = Tutoring::default();
+                (sequences, samples)
+            }
         }
     }
 }
@@ -76,6 +99,10 @@ impl Experiment {
             initial_state_variance: self.network.initial_state_variance,
             optimiser,
             recompute: training.recompute,
+            on_divergence: match training.on_divergence {
+                OnDivergence::Recover => learning::OnDivergence::Recover,
+                OnDivergence::Stop => learning::OnDivergence::Stop,
+            },
         }
     }
 }
@@ -87,21 +114,35 @@ impl Data {
             self.sequences.get_or_insert(sequences);
             self.steps.get_or_insert(steps);
             self.seed.get_or_insert(1);
+            if task == TaskName::Reach {
+                self.exact_positions.get_or_insert(false);
+            }
         }
         for file in self.files.iter_mut().flatten() {
             let path: PathBuf = folder.join(&*file);
             *file = std::path::absolute(&path).map_err(|error| Failure::disk("find", &path, error))?;
         }
         let by_default = match self.task {
-            None | Some(TaskName::Interact) => ScalingName::Fit,
-            Some(_) => ScalingName::None,
+            Some(task) if !task.has_robot() => ScalingName::None,
+            _ => ScalingName::Fit,
         };
         self.scaling.get_or_insert(ScalingChoice::Named(by_default));
         Ok(())
     }
 
+    /// Which part of its files is meant.
+    pub fn selection(&self) -> Selection {
+        Selection { topic: self.topic.clone(), period: self.period, channels: self.channels.clone() }
+    }
+
     /// The scaling that the experiment asks for, fitted to `data` if that is asked for.
     pub fn scaling_for(&self, data: &Dataset) -> Result<Scaling> {
+        let scaling = self.chosen_scaling(data)?;
+        check_reach(data, &scaling)?;
+        Ok(scaling)
+    }
+
+    fn chosen_scaling(&self, data: &Dataset) -> Result<Scaling> {
         let channels = data.channels().len();
         let fits = |what: &str, count: usize| {
             if count == channels {
@@ -123,6 +164,28 @@ impl Data {
             Some(ScalingChoice::Named(ScalingName::None)) | None => Ok(Scaling::identity(channels)),
         }
     }
+}
+
+/// Numbers up to this, and as little as its inverse apart, have variances that float64 can hold.
+const REACH: f64 = 1e150;
+
+/// Refuses channels whose samples are too large, or too close to each other, to compute their variances.
+fn check_reach(data: &Dataset, scaling: &Scaling) -> Result<()> {
+    for (i, name) in data.channels().iter().enumerate() {
+        let samples = || data.sequences().iter().flat_map(|s| s.values().iter().skip(i).step_by(data.channels().len()));
+        let largest = samples().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        let scale = scaling.scale()[i].abs();
+        let help = "bring the data to other units, or leave the channel out with `channels` in [data]";
+        if largest > REACH {
+            return Err(Failure::input(format!("channel {name} reaches {largest:e}; needed: at most {REACH:e}"), help));
+        }
+        if !(1.0 / REACH..=REACH).contains(&scale) || samples().any(|&x| scaling.to_scaled(i, x).abs() > REACH) {
+            let message =
+                format!("the samples of channel {name} cannot be scaled: a factor of {scale:e} would be needed");
+            return Err(Failure::input(message, help));
+        }
+    }
+    Ok(())
 }
 
 impl Training {

@@ -53,16 +53,29 @@ pub struct Data {
     /// Number of sequences of the task. Default: as in the thesis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sequences: Option<usize>,
-    /// Samples in each sequence of the task. Default: as in the thesis, 1000.
+    /// Samples in each sequence of the task. Default: as in the thesis, 1000, or 180 for "reach".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub steps: Option<usize>,
     /// Seed of the task's noise. Default 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
-    /// Files to read, relative to the experiment file: .csv, .txt, .npy or .npz. The sequences of all of them are learned
-    /// together.
+    /// For the task "reach": whether the object lies exactly at its three positions, instead of being placed up to 10 mm
+    /// off for each sequence. Default false.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exact_positions: Option<bool>,
+    /// Files to read, relative to the experiment file: .csv, .txt, .npy, .npz or .mcap. The sequences of all of them are
+    /// learned together.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub files: Option<Vec<PathBuf>>,
+    /// The topic whose messages are samples, in .mcap files. Default: /sensed, or the only one whose messages are JSON.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub topic: Option<String>,
+    /// Seconds between samples, to which the messages of .mcap files are brought. Default: as they are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub period: Option<f64>,
+    /// Names of the channels to learn, in this order. Default: all that the files have.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub channels: Option<Vec<String>>,
     /// How samples are brought into the reach of the mean units, which is -1 to 1. Default: "fit" for files and robots,
     /// "none" for other tasks.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -81,6 +94,8 @@ pub enum TaskName {
     Sinusoid,
     /// A random dynamical system with noise whose variance depends on its state (3.8-3.12)
     LimitCycle,
+    /// NAO's head and arm, as a tutor teaches it to touch a sphere, in simulation (thesis 4.2)
+    Reach,
     /// Two robots in a simulated world: one moves an object left and right, the other follows (5.2)
     Interact,
 }
@@ -193,12 +208,27 @@ pub struct Training {
     /// learned stays the same to the bit.
     #[serde(default)]
     pub recompute: bool,
+    /// What to do when training leaves its course.
+    #[serde(default)]
+    pub on_divergence: OnDivergence,
     /// Options of "momentum".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub momentum: Option<Momentum>,
     /// Options of "adam".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub adam: Option<Adam>,
+}
+
+/// What to do when training leaves its course.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum OnDivergence {
+    /// Goes back to the best network, halves the rate and goes on: when a value is not finite, and when the nll rises by more
+    /// than 10 nats above its best. After twenty times it stops.
+    #[default]
+    Recover,
+    /// Stops when a value is not finite, at the last good epoch. The rule of ascent is never interfered with.
+    Stop,
 }
 
 /// The rules of ascent.

@@ -23,6 +23,12 @@ impl Override {
         Ok(Self { path, value: Value::Integer(number), typed: format!("{option} {value}") })
     }
 
+    /// A shorthand option whose value is text.
+    pub fn text(option: &str, key: &str, value: &str) -> Self {
+        let path = key.split('.').map(str::to_owned).collect();
+        Self { path, value: Value::String(value.to_owned()), typed: format!("{option} {value}") }
+    }
+
     /// Puts the value in its place.
     ///
     /// # Errors

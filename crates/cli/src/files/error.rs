@@ -1,6 +1,7 @@
 //! What can be wrong with a data file: where, what was found, what is needed.
 
 use std::io;
+use std::path::Path;
 
 use miette::{Diagnostic, NamedSource, SourceSpan};
 
@@ -17,11 +18,14 @@ pub enum FileError {
         /// What the system said.
         #[source]
         source: io::Error,
+        /// What to do.
+        #[help]
+        help: Option<&'static str>,
     },
 
     /// The extension does not tell a format.
     #[error("the name of {path} does not tell what the file holds")]
-    #[diagnostic(help("data files end in .csv, .txt, .dat, .tsv, .npy or .npz"))]
+    #[diagnostic(help("data files end in .csv, .txt, .dat, .tsv, .npy, .npz or .mcap"))]
     Extension {
         /// The file.
         path: String,
@@ -97,6 +101,48 @@ pub enum FileError {
         source: zip::result::ZipError,
     },
 
+    /// A recording that cannot be read.
+    #[error("{path}: {problem}")]
+    Recording {
+        /// The file, and the topic.
+        path: String,
+        /// What is wrong.
+        problem: Box<RecordingProblem>,
+        /// What to do.
+        #[help]
+        help: Option<String>,
+    },
+
+    /// An option that makes sense for recordings only.
+    #[error("{path} is no recording; `{option}` goes with .mcap files only")]
+    #[diagnostic(help("leave it out"))]
+    NotARecording {
+        /// The file.
+        path: String,
+        /// The option.
+        option: &'static str,
+    },
+
+    /// A channel that is asked for, but not there.
+    #[error("{path} has no channel `{found}`")]
+    #[diagnostic(help("its channels are {channels}"))]
+    NoSuchChannel {
+        /// The file.
+        path: String,
+        /// What is asked for.
+        found: String,
+        /// What there is.
+        channels: String,
+    },
+
+    /// A format that can be read only.
+    #[error("{path} cannot be written: samples alone make no recording")]
+    #[diagnostic(help("write a .npz file, or a .csv; `scrnn simulate` and `scrnn data` write recordings of robots"))]
+    OnlyRead {
+        /// The file.
+        path: String,
+    },
+
     /// Fields that do not stand side by side.
     #[error("{path}: the fields `{first}` and `{other}` differ in the lengths of their sequences")]
     FieldsDiffer {
@@ -139,6 +185,28 @@ pub enum FileError {
         #[source]
         source: scrnn::error::Error,
     },
+}
+
+impl FileError {
+    /// The system's refusal to `verb` the file at `path`.
+    pub fn disk(verb: &'static str, path: &Path, source: io::Error) -> Self {
+        Self::Disk { verb, path: path.display().to_string(), help: disk_help(source.kind()), source }
+    }
+}
+
+/// What to do about a refusal of the operating system.
+pub fn disk_help(kind: io::ErrorKind) -> Option<&'static str> {
+    match kind {
+        io::ErrorKind::NotFound => {
+            Some("check the spelling, and that the folder is still there; paths start from the current folder")
+        }
+        io::ErrorKind::PermissionDenied => Some("check who owns the file and its folder"),
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Some("make room on the disk and try again"),
+        io::ErrorKind::FileTooLarge => Some("a limit forbids files of this size: `ulimit -f` shows it"),
+        io::ErrorKind::ReadOnlyFilesystem => Some("the disk is mounted for reading only: choose another folder"),
+        io::ErrorKind::NotADirectory => Some("part of the path is a file, not a folder"),
+        _ => None,
+    }
 }
 
 /// A line of a text file that cannot be read, with the text around it.
@@ -208,6 +276,125 @@ impl LineProblem {
             Self::NotFinite { .. } => "not a finite number".to_owned(),
         }
     }
+}
+
+/// What is wrong with a recording.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum RecordingProblem {
+    /// Other contents.
+    #[error("this is not an MCAP file")]
+    NotMcap,
+
+    /// A format that did not exist when this was written.
+    #[error("version {found} of MCAP; known: 0")]
+    Version {
+        /// The version, a character.
+        found: String,
+    },
+
+    /// No end.
+    #[error("the recording is cut off")]
+    CutOff,
+
+    /// Contents that contradict themselves.
+    #[error("the recording is damaged: {0}")]
+    Damaged(&'static str),
+
+    /// A chunk that cannot be unpacked.
+    #[error("a chunk cannot be unpacked ({compression}): {message}")]
+    Compression {
+        /// How it is packed.
+        compression: String,
+        /// What is wrong with it.
+        message: String,
+    },
+
+    /// A way to pack chunks that is not known.
+    #[error("its chunks are packed as `{}`; known: zstd, lz4, and unpacked ones", super::excerpt::shortened(found))]
+    UnknownCompression {
+        /// How they are packed.
+        found: String,
+    },
+
+    /// A file that fills the memory.
+    #[error("it promises to unpack to {unpacked} bytes; a file of its size may unpack to {allowed}")]
+    TooLarge {
+        /// What it says.
+        unpacked: u64,
+        /// What is granted.
+        allowed: u64,
+    },
+
+    /// No messages at all.
+    #[error("the recording holds no messages")]
+    Empty,
+
+    /// A topic that is not there.
+    #[error("there is no topic `{found}`")]
+    NoTopic {
+        /// What is asked for.
+        found: String,
+        /// What there is.
+        topics: String,
+    },
+
+    /// Several topics, and none asked for.
+    #[error("it is not clear which topic is meant")]
+    WhichTopic {
+        /// What there is.
+        topics: String,
+    },
+
+    /// Messages that are not JSON.
+    #[error("messages of {topic} are encoded as `{}`; needed: json", super::excerpt::shortened(found))]
+    Encoding {
+        /// The topic.
+        topic: String,
+        /// Their encoding.
+        found: String,
+    },
+
+    /// A message that is not like the first.
+    #[error("message {number}, of {time} s, {message}")]
+    Message {
+        /// Its number among all of the file.
+        number: usize,
+        /// When it was logged, in seconds.
+        time: String,
+        /// What is wrong with it.
+        message: String,
+    },
+
+    /// Messages without numbers.
+    #[error("the messages hold no numbers")]
+    NoNumbers,
+
+    /// A channel that is asked for, but not there.
+    #[error("there is no channel `{found}`")]
+    NoChannel {
+        /// What is asked for.
+        found: String,
+        /// What there is.
+        channels: String,
+    },
+
+    /// Messages at uneven times, and no period.
+    #[error("sequence {sequence}: {message}; steps are equally spaced")]
+    Uneven {
+        /// The sequence.
+        sequence: String,
+        /// What was found.
+        message: String,
+    },
+
+    /// A period that does not suit the messages.
+    #[error("sequence {sequence}: {message}")]
+    Resampling {
+        /// The sequence.
+        sequence: String,
+        /// What was found.
+        message: String,
+    },
 }
 
 /// What is wrong with a numpy array.

@@ -202,14 +202,21 @@ fn garbage_never_makes_a_reader_panic() {
         b"PK\x03\x04",
     ]);
 
+    let mcap = [mcap::tests::some_joints()];
+    let records =
+        "\x01 \x02 \x03 \x04 \x05 \x06 \0 \0\0\0 {\"joints\":[ {\"name\":\"a\", \"position\":1} ]} zstd lz4 json /a";
+    let mut record_pieces: Vec<&[u8]> = records.split(' ').map(str::as_bytes).collect();
+    record_pieces.extend([&b"\x89MCAP0\r\n"[..], b"\x08\0\0\0\0\0\0\0", b"\x28\xb5\x2f\xfd", b"\xff"]);
+
     let mut garbage = Garbage(1);
-    let mut read_well = [0; 3];
+    let mut read_well = [0; 4];
     for _ in 0..4000 {
         let bytes = garbage.bytes(&pieces, &text);
         let formats = [Format::Csv, Format::Text, Format::Tsv];
         read_well[0] += formats.iter().filter(|format| checked(**format, &bytes)).count();
         read_well[1] += usize::from(checked(Format::Npy, &garbage.bytes(&array_pieces, &npy)));
         read_well[2] += usize::from(checked(Format::Npz, &garbage.bytes(&array_pieces, &npz)));
+        read_well[3] += usize::from(checked(Format::Mcap, &garbage.bytes(&record_pieces, &mcap)));
     }
     // The test would say little if all of it failed at the first byte.
     assert!(read_well.iter().all(|&count| count > 50), "{read_well:?}");
@@ -217,7 +224,7 @@ fn garbage_never_makes_a_reader_panic() {
 
 /// Whether the bytes are data; a message is rendered if not.
 fn checked(format: Format, bytes: &[u8]) -> bool {
-    match format.parse("garbage", bytes) {
+    match format.parse("garbage", bytes, &Selection::default()) {
         Ok(data) => {
             assert!(data.total_samples() > 0 && !data.channels().is_empty());
             true

@@ -9,6 +9,6 @@ mod picture;
 mod writing;
 
 pub use chart::{Chart, Mark, Panel, Series, Tone};
-pub use page::{Block, Figure, Page, Section, Sheet};
+pub use page::{Block, Drawing, Figure, Page, Section, Sheet};
 pub use picture::{Picture, Pictures, View};
 pub use writing::{FIGURES, PAGE, write};

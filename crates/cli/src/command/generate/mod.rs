@@ -10,7 +10,7 @@ use scrnn::dataset::{Dataset, Sequence};
 use scrnn::generation::{ChannelFeedback, Feedback, Generated, GenerationOptions, Start, generate};
 use serde_json::{Value, json};
 
-use crate::args::Shared;
+use crate::args::{Part, Shared};
 use crate::failure::{Ending, Failure, Result};
 use crate::files::{self, Field};
 use crate::output;
@@ -74,6 +74,8 @@ pub struct Arguments {
     /// that were learned]
     #[arg(long, value_name = "FILE")]
     data: Option<PathBuf>,
+    #[command(flatten)]
+    part: Part,
     /// Use the run's best network instead of its newest
     #[arg(long)]
     best: bool,

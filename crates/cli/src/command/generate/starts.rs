@@ -38,7 +38,7 @@ pub fn rows(arguments: &Arguments, trained: &Trained, sensing: bool) -> Result<V
     let states = states(arguments, checkpoint)?;
     let mut rows = match (&arguments.data, sensing) {
         (Some(path), _) => {
-            let data = files::read(path)?;
+            let data = files::read_part(path, &arguments.part.of(path, trained.selection()))?;
             trained.check_channels(&data, path)?;
             pair(states, &data, checkpoint)?
         }

@@ -19,7 +19,7 @@ use scrnn::generation::{Feedback, Generated, GenerationOptions, Start, generate}
 use scrnn::recognition::{Recognition, RecognitionOptions, recognize};
 use serde::Serialize;
 
-use crate::args::Shared;
+use crate::args::{Part, Shared};
 use crate::command::generate::unit_names;
 use crate::failure::{Ending, Failure, Result};
 use crate::files::{self, Field};
@@ -53,8 +53,10 @@ Examples:
 pub struct Arguments {
     /// A run folder or a checkpoint file
     run: PathBuf,
-    /// The sequences to recognise: .csv, .txt, .npy or .npz; with --online also `-`, the standard input
+    /// The sequences to recognise: .csv, .txt, .npy, .npz or .mcap; with --online also `-`, the standard input
     data: PathBuf,
+    #[command(flatten)]
+    part: Part,
     /// Number of starts for each sequence
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
     starts: u32,
@@ -129,16 +131,17 @@ struct Tried {
 /// Recognises.
 pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     if arguments.online.wanted() {
-        let Arguments { run, data, best, rate, out, json, regression, .. } = arguments;
+        let Arguments { run, data, part, best, rate, out, json, regression, .. } = arguments;
         let how = How { regression, rate: *rate };
-        return online::run(&arguments.online, (run, *best, data), (&how, out.as_deref(), *json), shared);
+        return online::run(&arguments.online, (run, *best), (data, part), (&how, out.as_deref(), *json), shared);
     }
     if arguments.regression.given() {
         return Err(Failure::input("options of error regression go with --online", "add --online, or leave them out"));
     }
     let trained = Trained::open(&arguments.run, arguments.best)?;
     let checkpoint = &trained.checkpoint;
-    let data = files::read(&arguments.data)?;
+    let part = arguments.part.of(&arguments.data, trained.selection());
+    let data = files::read_part(&arguments.data, &part)?;
     trained.check_channels(&data, &arguments.data)?;
     data.check_for(&checkpoint.topology)?;
     let delay = checkpoint.topology.delay();

@@ -13,7 +13,7 @@ use serde_json::json;
 use super::deadline::{Deadline, Latency};
 use super::regression::RegressionArguments;
 use super::stream::{Arrival, Stream};
-use crate::args::Shared;
+use crate::args::{Part, Shared};
 use crate::command::generate::unit_names;
 use crate::failure::{Ending, Failure, Result};
 use crate::files::{self, Field};
@@ -213,7 +213,8 @@ impl<'a> Session<'a> {
 /// Follows recorded sequences, or a stream on the standard input.
 pub fn run(
     online: &Online,
-    (run, best, data): (&Path, bool, &Path),
+    (run, best): (&Path, bool),
+    (data, part): (&Path, &Part),
     (how, out, as_json): (&How<'_>, Option<&Path>, bool),
     shared: &Shared,
 ) -> Result<Ending> {
@@ -224,7 +225,7 @@ pub fn run(
         }
         return stream(online, how, &trained, as_json, shared);
     }
-    let data = files::read(data).map_err(Failure::from).and_then(|set| {
+    let data = files::read_part(data, &part.of(data, trained.selection())).map_err(Failure::from).and_then(|set| {
         trained.check_channels(&set, data)?;
         Ok(set)
     })?;

@@ -22,6 +22,9 @@ use crate::source;
 
 /// Steps of each closed loop (3.2.3).
 const STEPS: usize = 1000;
+/// Samples of a pattern that recognition looks at: ten periods. In the open loop u_0 is forgotten after some tens of
+/// steps, so that later samples say nothing about it, and only make the ascent slower and rougher.
+const OBSERVED: usize = 10 * PERIOD;
 /// Random orders of the labels that clustering is compared with.
 const SHUFFLES: usize = 9999;
 /// Added to a seed for data that were not learned.
@@ -402,6 +405,7 @@ fn recognition<'a>(
         seed,
         initial_state_variance: learned.experiment.network.initial_state_variance,
         warm_starts: vec![WarmStart::Random],
+        observed: Some(OBSERVED),
         // A training that was cut short for a trial does not deserve more.
         epochs: RecognitionOptions::default().epochs.min(learned.experiment.training.epochs),
         ..RecognitionOptions::default()

@@ -7,6 +7,10 @@ mod limit_cycle;
 mod metrics;
 mod overview;
 mod preset;
+mod reach;
+mod reach_page;
+mod reach_trials;
+mod reach_variance;
 mod seeds;
 mod sinusoid;
 mod study;
@@ -91,6 +95,8 @@ enum Name {
     Sinusoid,
     /// An oscillator that is driven by noise which depends on its state (3.4)
     LimitCycle,
+    /// NAO learns to touch a sphere from demonstrations, in simulation (4)
+    Reach,
     /// Two robots interact: reactive and proactive behaviour, and error regression (5)
     Interact,
 }
@@ -102,6 +108,7 @@ impl Name {
             Self::Patterns => "patterns",
             Self::Sinusoid => "sinusoid",
             Self::LimitCycle => "limit-cycle",
+            Self::Reach => "reach",
             Self::Interact => "interact",
         }
     }
@@ -123,6 +130,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         Name::Patterns => reproduce(&curves::PATTERNS, arguments, shared),
         Name::Sinusoid => reproduce(&sinusoid::Sinusoid, arguments, shared),
         Name::LimitCycle => reproduce(&limit_cycle::LimitCycle, arguments, shared),
+        Name::Reach => reproduce(&reach::Reach, arguments, shared),
         Name::Interact => interact::run(arguments, shared),
     }
 }

@@ -25,6 +25,7 @@ pub fn page<S: Study>(
         "lissajous" => "Twelve fluctuating Lissajous curves",
         "patterns" => "144 fluctuating patterns",
         "sinusoid" => "A sine wave with noise that changes over time",
+        "reach" => "NAO learns to reach",
         _ => "An oscillator driven by noise that depends on its state",
     };
     let seeds = match metrics.seeds.len() {
@@ -96,7 +97,7 @@ fn learning(networks: &[Vec<Learned>]) -> Section {
             .truth
             .as_ref()
             .and_then(|truth| entropy_of_noise(&truth.variances, first.network.topology.delay()));
-        let file = format!("learning-{}", first.name.to_lowercase());
+        let file = format!("learning-{}", first.name.to_lowercase().replace(' ', "-"));
         blocks.push(learning_curves(&file, &format!("Learning curve of the {}", first.name), &runs, floor));
     }
     let rows = networks.iter().flatten().map(|network| {

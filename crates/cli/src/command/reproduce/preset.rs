@@ -55,6 +55,15 @@ pub const SINUSOID: Kind =
 pub const LIMIT_CYCLE: Kind =
     Kind { name: "S-CTRNN", suffix: "", presets: [asset!("limit_cycle.toml"), asset!("limit_cycle_fast.toml")] };
 
+/// The S-CTRNN of the reaching experiment.
+pub const REACH: Kind =
+    Kind { name: "S-CTRNN", suffix: "", presets: [asset!("reaching.toml"), asset!("reaching_fast.toml")] };
+/// The same, learned from three exact positions.
+pub const REACH_EXACT: Kind = Kind {
+    name: "S-CTRNN of exact positions",
+    suffix: "-exact",
+    presets: [asset!("reaching_exact.toml"), asset!("reaching_exact_fast.toml")],
+};
 /// The S-MTRNN with initial states held together.
 pub const INTERACTION_NARROW: Kind = Kind {
     name: "S-MTRNN",

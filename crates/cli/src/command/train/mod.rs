@@ -52,6 +52,9 @@ pub struct Arguments {
     /// Seed of the initial weights. Short for --set seed=N
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    /// In .mcap files, the topic whose messages are samples. Short for --set data.topic=TOPIC
+    #[arg(long, value_name = "TOPIC")]
+    topic: Option<String>,
     /// Replace a value of the experiment, e.g. training.adam.rate=0.001 or network.groups.context.units=20
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<Override>,
@@ -68,6 +71,9 @@ impl Arguments {
             if let Some(value) = value {
                 overrides.push(Override::shorthand(option, key, value).map_err(|message| Failure::input(message, ""))?);
             }
+        }
+        if let Some(topic) = &self.topic {
+            overrides.push(Override::text("--topic", "data.topic", topic));
         }
         Ok(overrides)
     }

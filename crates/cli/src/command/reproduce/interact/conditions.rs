@@ -74,7 +74,11 @@ impl Condition {
             sequences: None,
             steps: None,
             seed: None,
+            exact_positions: None,
             files: Some(vec![self.file().into()]),
+            topic: None,
+            period: None,
+            channels: None,
             scaling: Some(ScalingChoice::Named(ScalingName::Fit)),
         };
         experiment.resolved(folder)

@@ -1,0 +1,475 @@
+//! NAO learns to reach from demonstrations, and adapts (thesis, chapter 4).
+
+use scrnn::engine::Engine;
+use scrnn_sim::agent::{Noise, Performance};
+use scrnn_sim::channels::{REACHING, VISION};
+use scrnn_sim::nao;
+use scrnn_sim::reaching::{POSITIONS, gaze_at, places_between};
+use scrnn_sim::tutor::Demonstration;
+use serde::Serialize;
+
+use super::curves::timely;
+use super::preset::{self, Kind};
+use super::reach_page;
+use super::reach_trials::{
+    Company, Found, Given, Shifted, Trial, Who, pooled_rate, pooled_spread_ratio, samples, still,
+};
+use super::reach_variance::{ByPhase, by_phase};
+use super::study::{Learned, Measure, SeedResult, Study, Verdict};
+use crate::assessment;
+use crate::failure::Result;
+use crate::report::Section;
+
+/// Half way between neighbouring positions.
+const BETWEEN: [f64; 2] = [-0.105, -0.035];
+
+/// Cycles of a performance with noise, and of the others.
+const CYCLES: usize = 30;
+const FEWER: usize = 10;
+
+/// Shifts of the sphere, from where to where, one each at another moment of the cycle.
+const SHIFTS: [(usize, usize); 6] = [(0, 1), (0, 2), (1, 2), (1, 0), (2, 1), (2, 0)];
+/// Sample of the first shift: a hand that keeps time is far from the sphere then.
+const FIRST_SHIFT: usize = 48;
+
+/// Sets the noise of performances apart from other numbers of a seed.
+const NOISE: u64 = 1000;
+
+/// The experiment.
+#[derive(Debug)]
+pub struct Reach;
+
+/// The figures of one seed.
+#[derive(Debug, Serialize)]
+pub struct Findings {
+    /// The demonstrations, one entry for each sequence.
+    pub demonstrations: Vec<Found>,
+    /// What came of each driver: by place, the three positions first, then those half way, then four at random.
+    pub conditions: Vec<Condition>,
+    /// After the sphere was put elsewhere.
+    pub shifts: Vec<Shifted>,
+    /// Variance over the cycle.
+    pub variance: ByPhase,
+    /// How many times faster than real time the closed loop ran, on one thread: the median of all performances.
+    pub speed: f64,
+}
+
+/// One driver at several places.
+#[derive(Debug, Clone, Serialize)]
+pub struct Condition {
+    /// Its name.
+    pub key: &'static str,
+    /// Its name on the page.
+    pub label: &'static str,
+    /// Touches per cycle over all places.
+    pub rate: f64,
+    /// Spread at the touch over spread after retraction, over all places.
+    pub spread_ratio: Option<f64>,
+    /// Place by place.
+    pub places: Vec<Found>,
+}
+
+impl Condition {
+    /// The places that were learned.
+    pub fn learned(&self) -> &[Found] {
+        &self.places[..POSITIONS.len().min(self.places.len())]
+    }
+
+    /// The others.
+    pub fn others(&self) -> &[Found] {
+        &self.places[POSITIONS.len().min(self.places.len())..]
+    }
+
+    /// The least touches per cycle over some places.
+    pub fn least(found: &[Found]) -> f64 {
+        found.iter().map(Found::rate).fold(f64::INFINITY, f64::min)
+    }
+}
+
+impl Findings {
+    /// A condition by its key.
+    pub fn condition(&self, key: &str) -> Option<&Condition> {
+        self.conditions.iter().find(|condition| condition.key == key)
+    }
+
+    fn rate(&self, key: &str) -> Option<f64> {
+        self.condition(key).map(|condition| condition.rate)
+    }
+
+    fn spread_ratio(&self, key: &str) -> Option<f64> {
+        self.condition(key).and_then(|condition| condition.spread_ratio)
+    }
+
+    /// Spread ratio of the demonstrations.
+    pub fn demonstrated_spread_ratio(&self) -> Option<f64> {
+        pooled_spread_ratio(&self.demonstrations.iter().collect::<Vec<_>>())
+    }
+
+    /// Touches after a shift, from the second cycle on.
+    pub fn rate_after_shift(&self) -> f64 {
+        let sum = |of: fn(&Shifted) -> usize| self.shifts.iter().map(of).sum::<usize>() as f64;
+        sum(|shift| shift.touched) / sum(|shift| shift.expected).max(1.0)
+    }
+
+    /// Mean samples to the first touch after a shift; none if one never came.
+    pub fn steps_to_adapt(&self) -> Option<f64> {
+        let steps: Option<Vec<f64>> = self.shifts.iter().map(|shift| shift.steps_to_adapt).collect();
+        steps.map(|steps| steps.iter().sum::<f64>() / steps.len() as f64)
+    }
+}
+
+/// What figures are drawn from.
+pub struct Material {
+    /// The demonstrations.
+    pub demonstrations: Vec<Demonstration>,
+    /// Performances with noise at the positions and half way between, from position 1 to position 3.
+    pub performances: Vec<(Performance, Given)>,
+}
+
+/// A driver and where it is tried.
+struct Plan {
+    key: &'static str,
+    label: &'static str,
+    who: Who,
+    cycles: usize,
+    places: Vec<f64>,
+    frozen: Option<[f64; 2]>,
+}
+
+/// All drivers. `constant` is the variance of the noise that does not change.
+fn plans(places: &[f64], constant: Vec<f64>, frozen: [f64; 2]) -> Vec<Plan> {
+    let learned_and_between = places[..POSITIONS.len() + BETWEEN.len()].to_vec();
+    let plan = |key, label, who, cycles| Plan { key, label, who, cycles, places: places.to_vec(), frozen: None };
+    let network = |noise| Who::Network { index: 0, noise };
+    vec![
+        plan("noise", "S-CTRNN, predicted noise", network(Noise::Predicted), CYCLES),
+        plan("no_noise", "S-CTRNN, no noise", network(Noise::Off), FEWER),
+        plan("constant_noise", "S-CTRNN, noise of constant variance", network(Noise::Constant(constant)), FEWER),
+        Plan {
+            frozen: Some(frozen),
+            ..plan("frozen", "S-CTRNN, head frozen at position 2", network(Noise::Predicted), FEWER)
+        },
+        Plan {
+            places: learned_and_between,
+            ..plan(
+                "exact",
+                "S-CTRNN that learned three exact positions",
+                Who::Network { index: 1, noise: Noise::Predicted },
+                FEWER,
+            )
+        },
+        plan("replay", "replay of the nearest mean demonstration", Who::Replay, FEWER),
+        plan("mixture", "GMM/GMR, mean", Who::Mixture { noise: false }, FEWER),
+        plan("mixture_noise", "GMM/GMR, noise of its covariance", Who::Mixture { noise: true }, FEWER),
+    ]
+}
+
+impl Study for Reach {
+    type Findings = Findings;
+    type Material = Material;
+
+    fn networks(&self) -> &'static [Kind] {
+        &[preset::REACH, preset::REACH_EXACT]
+    }
+
+    fn evaluate(&self, networks: &[Learned], seed: u64, engine: &Engine) -> Result<(Findings, Material)> {
+        let learned = &networks[0];
+        let demonstrations = &learned.source.demonstrations;
+        let scaling = learned.experiment.data.scaling_for(&learned.source.data)?;
+        let scaled = scaling.apply(&learned.source.data);
+        let open = assessment::open_loop(&learned.network, &learned.states(), &scaled, engine)?;
+        let n = REACHING.len();
+        let mean_variance = |channel: usize| {
+            let all = open.iter().flat_map(|one| one.variance.iter().skip(channel).step_by(n));
+            all.clone().sum::<f64>() / all.count() as f64
+        };
+        let constant: Vec<f64> = (0..n).map(mean_variance).collect();
+
+        let company = Company::new(networks, seed, engine.instruction_set())?;
+        let mut places = [&POSITIONS[..], &BETWEEN].concat();
+        places.extend(places_between(seed, 4));
+        let frozen = gaze_at(&nao::load_one_armed()?, POSITIONS[1])?;
+        let plans = plans(&places, constant, frozen);
+        let mut trials = Vec::new();
+        for plan in &plans {
+            for (place, &y) in plan.places.iter().enumerate() {
+                let performance = Performance { frozen: plan.frozen, ..still(y, plan.cycles) };
+                let pictures = plan.key == "noise" && place < POSITIONS.len();
+                trials.push(Trial {
+                    who: plan.who.clone(),
+                    performance,
+                    seed: seed + NOISE * (1 + place as u64),
+                    pictures,
+                });
+            }
+        }
+        let shifts = trials.len();
+        for (k, &(from, to)) in SHIFTS.iter().enumerate() {
+            let at = FIRST_SHIFT + 2 * k;
+            let shift = Some((at, POSITIONS[to]));
+            let performance = Performance { shift, samples: at + samples(15), ..still(POSITIONS[from], 0) };
+            let who = Who::Network { index: 0, noise: Noise::Predicted };
+            trials.push(Trial { who, performance, seed: seed + NOISE * (100 + k as u64), pictures: false });
+        }
+        let given = company.give_all(&trials, engine.threads())?;
+
+        let mut conditions = Vec::new();
+        let mut next = 0;
+        for Plan { key, label, places, .. } in plans {
+            let own = next..next + places.len();
+            next = own.end;
+            let found: Vec<Found> =
+                own.map(|k| Found::in_performance(&trials[k].performance, &given[k].performed)).collect();
+            let all: Vec<&Found> = found.iter().collect();
+            let (rate, spread_ratio) = (pooled_rate(&all), pooled_spread_ratio(&all));
+            conditions.push(Condition { key, label, rate, spread_ratio, places: found });
+        }
+        let after = trials[shifts..].iter().zip(&given[shifts..]);
+        let shifted = after.filter_map(|(trial, given)| Shifted::of(&trial.performance, &given.performed)).collect();
+        let driving: Vec<_> = given[..POSITIONS.len()]
+            .iter()
+            .map(|given| (given.performed.decisions.as_slice(), given.performed.cycles.as_slice()))
+            .collect();
+        let variance = by_phase(demonstrations, &scaled, &open, &driving, scaling.scale());
+        let mut speeds: Vec<f64> = given.iter().map(|given| given.speed).collect();
+        speeds.sort_by(f64::total_cmp);
+        let demonstrated = demonstrations.iter().map(|one| {
+            let expected = one.samples.len() / n / scrnn_sim::reaching::CYCLE;
+            Found::of(one.y, expected, &one.cycles)
+        });
+        let findings = Findings {
+            demonstrations: demonstrated.collect(),
+            conditions,
+            shifts: shifted,
+            variance,
+            speed: speeds[speeds.len() / 2],
+        };
+        // The positions and what lies half way, from right to left.
+        let performances =
+            [0, 3, 1, 4, 2].map(|k| (trials[k].performance.clone(), given[k].clone())).into_iter().collect();
+        Ok((findings, Material { demonstrations: demonstrations.clone(), performances }))
+    }
+
+    fn measures(&self) -> Vec<Measure<Findings>> {
+        let measure = Measure::<Findings>::new;
+        vec![
+            measure(
+                "touched",
+                "Touches per cycle, predicted noise",
+                "pooled over nine places: positions 1 to 3, half way between, four at random",
+                "\"able to produce the reaching movement not only ... at the learned positions\"",
+                3,
+                |f| f.rate("noise"),
+            ),
+            measure("touched_no_noise", "Touches per cycle, no noise", "the same places", "", 3, |f| {
+                f.rate("no_noise")
+            }),
+            measure(
+                "aim",
+                "Hand off its place at the touch, mm",
+                "from where it was taught to be, mean over places, with noise",
+                "",
+                1,
+                |f| {
+                    let places = &f.condition("noise")?.places;
+                    let aims: Option<Vec<f64>> = places.iter().map(|found| found.aim).collect();
+                    aims.map(|aims| 1e3 * aims.iter().sum::<f64>() / aims.len() as f64)
+                },
+            ),
+            measure(
+                "spread_ratio",
+                "Spread of the hand, touch over retraction",
+                "with noise, over all places",
+                "\"converged\" at the touch, \"diverges\" after it (Fig. 4.5)",
+                3,
+                |f| f.spread_ratio("noise"),
+            ),
+            measure(
+                "spread_ratio_demonstrated",
+                "The same in the demonstrations",
+                "within each sequence",
+                "",
+                3,
+                Findings::demonstrated_spread_ratio,
+            ),
+            measure(
+                "touched_after_shift",
+                "Touches per cycle after a shift",
+                "from the second cycle at the new place on",
+                "\"able to adaptively touch the object even if the object was shifted\"",
+                3,
+                |f| Some(f.rate_after_shift()),
+            ),
+            measure(
+                "steps_to_adapt",
+                "Samples to the first touch after a shift",
+                "half seconds; a cycle has 12",
+                "",
+                1,
+                Findings::steps_to_adapt,
+            ),
+            measure(
+                "rank_correlation",
+                "Predicted variance over the cycle",
+                "rank correlation with the demonstrations' own variance",
+                "lowest \"at the very moment of touching\" (Fig. 4.4)",
+                3,
+                |f| f.variance.rank_correlation,
+            ),
+            measure(
+                "rank_correlation_driving",
+                "The same while the network drives the robot",
+                "by the robot's own touches",
+                "",
+                3,
+                |f| f.variance.rank_correlation_driving,
+            ),
+            measure(
+                "touch_over_retraction",
+                "Predicted variance, touch over retraction",
+                "one step ahead of the demonstrations",
+                "",
+                4,
+                |f| Some(f.variance.touch_over_retraction),
+            ),
+            measure("touched_frozen", "Control: head frozen at position 2", "touches per cycle", "", 3, |f| {
+                f.rate("frozen")
+            }),
+            measure(
+                "spread_ratio_constant",
+                "Control: noise of constant variance, spread ratio",
+                "the same mean variance at all times",
+                "",
+                3,
+                |f| f.spread_ratio("constant_noise"),
+            ),
+            measure(
+                "touched_exact_between",
+                "Control: learned from exact positions, half way between",
+                "touches per cycle",
+                "as in the thesis' text, which reports success",
+                3,
+                |f| f.condition("exact").map(|exact| pooled_rate(&exact.others().iter().collect::<Vec<_>>())),
+            ),
+            measure(
+                "touched_replay",
+                "Instead: replay of the nearest mean demonstration",
+                "touches per cycle",
+                "",
+                3,
+                |f| f.rate("replay"),
+            ),
+            measure("touched_mixture", "Instead: GMM/GMR, mean", "touches per cycle", "", 3, |f| f.rate("mixture")),
+            measure("touched_mixture_noise", "Instead: GMM/GMR with its noise", "touches per cycle", "", 3, |f| {
+                f.rate("mixture_noise")
+            }),
+            measure("speed", "Closed loop, times real time", "median of all performances, on one thread", "", 0, |f| {
+                Some(f.speed)
+            }),
+        ]
+    }
+
+    fn verdicts(&self, seeds: &[SeedResult<Findings>]) -> Vec<Verdict> {
+        verdicts(seeds)
+    }
+
+    fn sections(&self, seed: &SeedResult<Findings>, material: &Material) -> Vec<Section> {
+        reach_page::sections(&seed.findings, material)
+    }
+}
+
+fn verdicts(seeds: &[SeedResult<Findings>]) -> Vec<Verdict> {
+    let condition = |key: &'static str, goal: &str, needed: &str, judge: fn(&Condition) -> (String, bool)| {
+        Verdict::every(seeds, goal, needed, |seed| {
+            seed.findings.condition(key).map_or(("none".to_owned(), false), judge)
+        })
+    };
+    let number = |goal: &str, needed: &str, of: fn(&Findings) -> Option<f64>, met: fn(f64) -> bool| {
+        Verdict::every(seeds, goal, needed, |seed| {
+            let value = of(&seed.findings);
+            (value.map_or("none".into(), |value| format!("{value:.3}")), value.is_some_and(met))
+        })
+    };
+    vec![
+        condition(
+            "noise",
+            "touches per cycle at the learned positions, predicted noise",
+            "at least 0.92 at each",
+            |c| {
+                let least = Condition::least(c.learned());
+                (format!("least {least:.3}"), least >= 0.92)
+            },
+        ),
+        condition("noise", "touches per cycle at other places, predicted noise", "at least 0.88 at each", |c| {
+            let least = Condition::least(c.others());
+            (format!("least {least:.3}"), least >= 0.88)
+        }),
+        condition("noise", "touches per cycle, pooled, predicted noise", "at least 0.93", |c| {
+            (format!("{:.3}", c.rate), c.rate >= 0.93)
+        }),
+        condition("noise", "every movement keeps going", "29 to 31 cycles of 30", |c| {
+            let counts = c.places.iter().map(|found| found.cycles);
+            let (least, most) = counts.fold((usize::MAX, 0), |(low, high), n| (low.min(n), high.max(n)));
+            (format!("{least} to {most}"), least >= 29 && most <= 31)
+        }),
+        condition("no_noise", "touches per cycle, no noise", "at least 0.99", |c| {
+            (format!("{:.3}", c.rate), c.rate >= 0.99)
+        }),
+        number(
+            "touches per cycle after a shift, from the second on",
+            "at least 0.92",
+            |f| Some(f.rate_after_shift()),
+            |r| r >= 0.92,
+        ),
+        Verdict::every(seeds, "joint targets beyond limits; samples with self-collision", "0; 0", |seed| {
+            let ours = seed.findings.conditions.iter().filter(|c| ["noise", "no_noise"].contains(&c.key));
+            let places: Vec<&Found> = ours.flat_map(|c| &c.places).collect();
+            let beyond: usize = places.iter().map(|found| found.beyond_limits).sum();
+            let collisions: usize = places.iter().map(|found| found.self_collisions).sum();
+            (format!("{beyond}; {collisions}"), beyond + collisions == 0)
+        }),
+        number(
+            "spread at the touch over spread after retraction, demonstrations",
+            "at most 0.3",
+            Findings::demonstrated_spread_ratio,
+            |r| r <= 0.3,
+        ),
+        number("the same in the robot's own movement", "at most 0.3", |f| f.spread_ratio("noise"), |r| r <= 0.3),
+        number(
+            "rank correlation of predicted variance with the demonstrations' own",
+            "above 0.9",
+            |f| f.variance.rank_correlation,
+            |r| r > 0.9,
+        ),
+        Verdict::every(seeds, "phase of the lowest predicted variance", "within 1 sample of the touch", |seed| {
+            let lowest = seed.findings.variance.lowest;
+            (lowest.to_string(), lowest.abs() <= 1)
+        }),
+        number(
+            "predicted variance, touch over retraction",
+            "below 0.1",
+            |f| Some(f.variance.touch_over_retraction),
+            |r| r < 0.1,
+        ),
+        Verdict::every(seeds, "predicted variance over squared error, by phase", "0.5 to 2 at every phase", |seed| {
+            let [low, high] = seed.findings.variance.predicted_over_residual;
+            (format!("{low:.2} to {high:.2}"), low >= 0.5 && high <= 2.0)
+        }),
+        number("control: touches per cycle with the head frozen", "at most 0.3", |f| f.rate("frozen"), |r| r <= 0.3),
+        number(
+            "control: spread ratio with noise of constant variance",
+            "above 0.35",
+            |f| f.spread_ratio("constant_noise"),
+            |r| r > 0.35,
+        ),
+        Verdict::every(seeds, "speed of the closed loop", "at least 100 times real time", |seed| {
+            (format!("{:.0}", seed.findings.speed), seed.findings.speed >= 100.0)
+        }),
+        timely(seeds, 180.0),
+    ]
+}
+
+/// The channel that a name of the thesis' figures stands for.
+pub fn channel(name: &str) -> usize {
+    REACHING.iter().position(|channel| *channel == name).unwrap_or(VISION)
+}

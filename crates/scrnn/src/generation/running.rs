@@ -1,0 +1,234 @@
+//! One network beside a world that moves on: it takes in a sample and predicts, step by step.
+
+use pulp::{Simd, WithSimd};
+use rand::SeedableRng;
+use rand::rngs::ChaCha8Rng;
+
+use super::{DOMAIN, Feedback, check, draw, input};
+use crate::engine::{InstructionSet, Run};
+use crate::error::{Error, Result};
+use crate::network::Network;
+use crate::packed::Packed;
+use crate::stepper::Stepper;
+
+/// A network that generates while its samples are still to come. Stepped through recorded samples it gives the bits of
+/// [`generate`](super::generate) with one start.
+#[derive(Debug)]
+pub struct Running {
+    packed: Packed,
+    stepper: Stepper,
+    set: InstructionSet,
+    feedback: Feedback,
+    random: ChaCha8Rng,
+    delay: usize,
+    floor: f64,
+    has_variance: bool,
+    steps: usize,
+    /// v of the last step, with the floor.
+    variance: Vec<f64>,
+    /// The samples of the last xi steps; that of step k is at k modulo xi.
+    fed_back: Vec<f64>,
+}
+
+impl Running {
+    /// A network at its initial state, before the first sample.
+    ///
+    /// # Errors
+    /// [`Error::Length`] for an initial state or a feedback of another size than the network's, and [`Error::Setting`] for
+    /// a share outside of [0, 1].
+    pub fn new(
+        network: &Network,
+        initial_state: &[f64],
+        feedback: Feedback,
+        seed: u64,
+        set: InstructionSet,
+    ) -> Result<Self> {
+        let topology = &network.topology;
+        let (n_x, n_c, delay) = (topology.channels(), topology.context_units(), topology.delay());
+        check(&feedback, n_x)?;
+        if initial_state.len() != n_c {
+            let what = "the initial state".to_owned();
+            return Err(Error::Length { what, found: initial_state.len(), needed: n_c });
+        }
+        let mut packed = Packed::new(topology, set);
+        packed.fill(&network.parameters);
+        let mut stepper = Stepper::new(&packed, 1);
+        stepper.start(&packed, 0, initial_state);
+        set.run(Enter { stepper: &mut stepper, packed: &packed });
+        let has_variance = topology.has_variance();
+        Ok(Self {
+            packed,
+            stepper,
+            set,
+            feedback,
+            random: ChaCha8Rng::seed_from_u64(seed ^ DOMAIN),
+            delay,
+            floor: topology.variance_floor(),
+            has_variance,
+            steps: 0,
+            variance: vec![0.0; if has_variance { n_x } else { 0 }],
+            fed_back: vec![0.0; delay * n_x],
+        })
+    }
+
+    /// Takes in the sample of this step, as far as the feedback senses it, and predicts the sample xi steps ahead. The
+    /// first xi steps take it in whole, since nothing was predicted for them.
+    ///
+    /// # Errors
+    /// [`Error::Length`] for a sample of another size; it is not taken in.
+    pub fn step(&mut self, sensed: &[f64]) -> Result<()> {
+        let n_x = self.packed.n_x;
+        if sensed.len() != n_x {
+            return Err(Error::Length { what: "the sample".to_owned(), found: sensed.len(), needed: n_x });
+        }
+        let slot = (self.steps % self.delay) * n_x;
+        let predicted = (self.steps >= self.delay).then(|| &self.fed_back[slot..slot + n_x]);
+        input(self.stepper.input(&self.packed, 0), &self.feedback, Some(sensed), predicted);
+        self.set.run(Step { stepper: &mut self.stepper, packed: &self.packed });
+
+        let mean = self.stepper.mean(&self.packed, 0);
+        let fed_back = &mut self.fed_back[slot..slot + n_x];
+        let raw = self.stepper.variance(&self.packed, 0);
+        for (i, (&y, rule)) in mean.iter().zip(&self.feedback.0).enumerate() {
+            fed_back[i] = match self.has_variance {
+                false => y,
+                true => {
+                    self.variance[i] = raw[i] + self.floor;
+                    draw(&mut self.random, y, self.variance[i], rule.noise)
+                }
+            };
+        }
+        self.steps += 1;
+        Ok(())
+    }
+
+    /// Changes where inputs come from, from the next step on.
+    ///
+    /// # Errors
+    /// As [`Running::new`].
+    pub fn set_feedback(&mut self, feedback: Feedback) -> Result<()> {
+        check(&feedback, self.packed.n_x)?;
+        self.feedback = feedback;
+        Ok(())
+    }
+
+    /// Steps taken.
+    #[must_use]
+    pub fn steps(&self) -> usize {
+        self.steps
+    }
+
+    /// y of the last step, N_O values.
+    #[must_use]
+    pub fn mean(&self) -> &[f64] {
+        self.stepper.mean(&self.packed, 0)
+    }
+
+    /// v of the last step, N_O values; empty without variance units.
+    #[must_use]
+    pub fn variance(&self) -> &[f64] {
+        &self.variance
+    }
+
+    /// y of the last step, plus noise where the channel asks for it, N_O values. After xi - 1 further steps it is what is
+    /// fed back.
+    #[must_use]
+    pub fn sample(&self) -> &[f64] {
+        let slot = (self.steps.saturating_sub(1) % self.delay) * self.packed.n_x;
+        &self.fed_back[slot..slot + self.packed.n_x]
+    }
+
+    /// The oldest sample that is still to be fed back, N_O values: the prediction of the next step's input. It is 0 as
+    /// long as fewer than xi steps are taken.
+    #[must_use]
+    pub fn due(&self) -> &[f64] {
+        let slot = (self.steps % self.delay) * self.packed.n_x;
+        &self.fed_back[slot..slot + self.packed.n_x]
+    }
+
+    /// c after the last step, N_C values.
+    #[must_use]
+    pub fn context(&self) -> &[f64] {
+        self.stepper.context(&self.packed, 0)
+    }
+}
+
+struct Enter<'a> {
+    stepper: &'a mut Stepper,
+    packed: &'a Packed,
+}
+
+impl WithSimd for Enter<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        self.stepper.enter(simd, self.packed);
+    }
+}
+
+struct Step<'a> {
+    stepper: &'a mut Stepper,
+    packed: &'a Packed,
+}
+
+impl WithSimd for Step<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        self.stepper.step(simd, self.packed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::Engine;
+    use crate::generation::tests::{U0, network, samples};
+    use crate::generation::{ChannelFeedback, GenerationOptions, Start, generate};
+
+    #[test]
+    fn stepping_gives_the_bits_of_generation() {
+        for (delay, set) in
+            [(1, InstructionSet::best()), (3, InstructionSet::best()), (2, InstructionSet::available()[0])]
+        {
+            let (network, sensed) = (network(delay, 0.01), samples(40));
+            let rules = [ChannelFeedback { sensed: 1.0, noise: true }, ChannelFeedback { sensed: 0.0, noise: true }];
+            let feedback = Feedback(rules.to_vec());
+            let start = Start { initial_state: &U0, sensed: &sensed };
+            let options = GenerationOptions { steps: 40, feedback: feedback.clone(), seed: 9, contexts: true };
+            let whole = generate(&network, &[start], &options, &Engine::new(1, set).unwrap()).unwrap();
+            let mut running = Running::new(&network, &U0, feedback, 9, set).unwrap();
+            for (k, sample) in sensed.chunks_exact(2).enumerate() {
+                if k >= delay {
+                    assert_eq!(
+                        running.due(),
+                        &whole[0].sample[2 * (k - delay)..2 * (k - delay) + 2],
+                        "due at step {k}"
+                    );
+                }
+                running.step(sample).unwrap();
+                assert_eq!(running.mean(), &whole[0].mean[2 * k..2 * k + 2], "mean of step {k}");
+                assert_eq!(running.variance(), &whole[0].variance[2 * k..2 * k + 2], "variance of step {k}");
+                assert_eq!(running.sample(), &whole[0].sample[2 * k..2 * k + 2], "sample of step {k}");
+                assert_eq!(running.context(), &whole[0].contexts[13 * k..13 * (k + 1)], "context of step {k}");
+            }
+            assert_eq!(running.steps(), 40);
+        }
+    }
+
+    #[test]
+    fn wrong_sizes_are_refused_and_change_nothing() {
+        let network = network(1, 0.0);
+        let new = |state: &[f64], feedback| Running::new(&network, state, feedback, 1, InstructionSet::best());
+        assert!(new(&U0[1..], Feedback::open(2)).unwrap_err().to_string().contains("12 values; needed: 13"));
+        assert!(new(&U0, Feedback::open(3)).unwrap_err().to_string().contains("3 values; needed: 2"));
+        let mut running = new(&U0, Feedback::open(2)).unwrap();
+        assert!(running.step(&[0.1]).is_err() && running.set_feedback(Feedback::mixed(2, -1.0, true)).is_err());
+        running.step(&[0.1, 0.2]).unwrap();
+        let mut fresh = new(&U0, Feedback::open(2)).unwrap();
+        fresh.step(&[0.1, 0.2]).unwrap();
+        assert_eq!(running.mean(), fresh.mean());
+    }
+}
