@@ -4,6 +4,8 @@
 mod experiments;
 #[path = "cli/extremes.rs"]
 mod extremes;
+#[path = "cli/following.rs"]
+mod following;
 #[path = "cli/recordings.rs"]
 mod recordings;
 #[path = "cli/refusals.rs"]
