@@ -2,6 +2,8 @@
 
 #[path = "cli/experiments.rs"]
 mod experiments;
+#[path = "cli/reaching.rs"]
+mod reaching;
 #[path = "cli/recordings.rs"]
 mod recordings;
 #[path = "cli/refusals.rs"]
