@@ -119,3 +119,43 @@ fn drawn(left: f64, seed: u64) -> Result<Dataset> {
     let rows: scrnn_sim::error::Result<Vec<Sequence>> = rows.collect();
     Ok(Dataset::new(CHANNELS.map(String::from).to_vec(), rows?)?)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn conditions_differ_in_variance_and_recordings_alone() {
+        let experiment =
+            |condition: &Condition| condition.experiment(Path::new("/place"), Preset::Fast, 3, (Some(7), &[])).unwrap();
+        let narrow = experiment(&NARROW);
+        assert_eq!((narrow.seed, narrow.training.epochs, narrow.network.delay), (3, 7, 5));
+        assert_eq!(narrow.data.files, Some(vec!["/place/recordings.csv".into()]));
+        for condition in BEYOND.iter().chain([&WIDE]) {
+            let other = experiment(condition);
+            assert_eq!(other.network.groups, narrow.network.groups);
+            assert_eq!(
+                variance_of(condition, &[narrow.clone(), other.clone()]),
+                Some(other.network.initial_state_variance)
+            );
+        }
+        assert_eq!(narrow.network.initial_state_variance, 1e-5);
+        assert_eq!(experiment(&WIDE).network.initial_state_variance, 10.0);
+        assert_eq!(experiment(&BEYOND[1]).network.initial_state_variance, 1e-3);
+        assert_eq!(experiment(&BEYOND[4]).data.files, Some(vec!["/place/recordings-80-left.csv".into()]));
+    }
+
+    #[test]
+    fn the_thesis_presets_have_the_settings_of_chapter_5() {
+        for (condition, variance) in [(NARROW, 1e-5), (WIDE, 10.0)] {
+            let experiment = condition.experiment(Path::new("/place"), Preset::Thesis, 1, (None, &[])).unwrap();
+            let [fast, slow] = experiment.network.groups.as_slice() else { panic!("two groups") };
+            assert_eq!((fast.units, fast.time_constant, slow.units, slow.time_constant), (30, 5.0, 10, 100.0));
+            assert_eq!((experiment.training.epochs, experiment.network.initial_state_variance), (500_000, variance));
+            let momentum = experiment.training.momentum.unwrap();
+            assert_eq!((momentum.rate, momentum.momentum), (1e-4, 0.9));
+            let adaptive = momentum.adaptive_rate.unwrap();
+            assert_eq!((adaptive.max_error_ratio, adaptive.decrease, adaptive.increase), (1.1, 0.7, 1.05));
+        }
+    }
+}

@@ -108,6 +108,9 @@ fn over_time(title: &str, y: Option<(f64, f64)>, series: Vec<Series>) -> Panel {
     panel
 }
 
+/// Mean and context of one sample.
+type Held<'a> = (&'a Vec<f64>, &'a Vec<f64>);
+
 const RANGE: Option<(f64, f64)> = Some((-1.0, 1.0));
 
 fn figure(
@@ -277,18 +280,18 @@ pub fn window(materials: &[Material]) -> Option<Figure> {
     let mut columns = Vec::new();
     for (word, now) in [("before", centre - APART), ("modification", centre), ("after", centre + APART)] {
         // Each sample as the last window that held it left it, or as it is foreseen.
-        let held = |sample: usize| -> Option<(&Vec<f64>, &Vec<f64>)> {
+        let held = |sample: usize| -> Option<Held<'_>> {
             let first = |k: usize| k + 1 - snapshots[k].window;
             let k = (0..=now).rev().find(|&k| first(k) <= sample && sample - first(k) < snapshots[k].means.len())?;
             let place = sample - first(k);
             // Only the present moment speaks about the future.
             (sample <= k || k == now).then(|| (&snapshots[k].means[place], &snapshots[k].contexts[place]))
         };
-        let points = |of: &dyn Fn(&(&Vec<f64>, &Vec<f64>)) -> f64, range: std::ops::Range<usize>| -> Vec<(f64, f64)> {
+        let points = |of: &dyn Fn(&Held<'_>) -> f64, range: std::ops::Range<usize>| -> Vec<(f64, f64)> {
             range.filter_map(|sample| held(sample).map(|pair| (sample as f64, of(&pair)))).collect()
         };
         let (tail, head) = (now + 1 - snapshots[now].window, now + 1);
-        let series = |of: &dyn Fn(&(&Vec<f64>, &Vec<f64>), usize) -> f64, columns: &[(usize, String)]| -> Vec<Series> {
+        let series = |of: &dyn Fn(&Held<'_>, usize) -> f64, columns: &[(usize, String)]| -> Vec<Series> {
             let mut all = Vec::new();
             for (k, (column, name)) in columns.iter().enumerate() {
                 let past = points(&|pair| of(pair, *column), from..head);
@@ -307,8 +310,8 @@ pub fn window(materials: &[Material]) -> Option<Figure> {
             all.extend(series);
             Panel { title, x: (from as f64, to as f64), y, series: all, failed: false }
         };
-        let mean = |pair: &(&Vec<f64>, &Vec<f64>), column: usize| pair.0[column];
-        let context = |pair: &(&Vec<f64>, &Vec<f64>), column: usize| pair.1[column];
+        let mean = |pair: &Held<'_>, column: usize| pair.0[column];
+        let context = |pair: &Held<'_>, column: usize| pair.1[column];
         let (offset, scale) = material.column;
         let error: Vec<(f64, f64)> = (from..head)
             .filter_map(|sample| {
@@ -335,4 +338,30 @@ pub fn window(materials: &[Material]) -> Option<Figure> {
         1.5,
         in_rows(columns),
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_modification_is_the_largest_jump_that_has_room_around_it() {
+        let snapshot =
+            |tail: f64| Snapshot { window: 1, means: Vec::new(), contexts: Vec::new(), tail: vec![tail, 0.0] };
+        let mut tails = vec![0.0; 150];
+        tails[10..].iter_mut().for_each(|tail| *tail += 9.0);
+        tails[80..].iter_mut().for_each(|tail| *tail -= 2.0);
+        tails[90..].iter_mut().for_each(|tail| *tail += 1.0);
+        let snapshots: Vec<Snapshot> = tails.into_iter().map(snapshot).collect();
+        assert_eq!(modification(&snapshots), Some(80));
+        assert_eq!(modification(&snapshots[..60]), None);
+    }
+
+    #[test]
+    fn columns_become_rows() {
+        let panel = |title: &str| Panel::spanning(title, Vec::new());
+        let panels = in_rows(vec![vec![panel("a"), panel("b")], vec![panel("c"), panel("d")]]);
+        let titles: Vec<&str> = panels.iter().map(|panel| panel.title.as_str()).collect();
+        assert_eq!(titles, ["a", "c", "b", "d"]);
+    }
 }

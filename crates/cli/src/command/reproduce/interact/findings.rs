@@ -396,3 +396,97 @@ fn goals(summary: &[Summary], comparisons: &[Comparison], networks: &[Findings],
     });
     goals
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::trials::Peak;
+    use super::*;
+
+    fn reactions(mean: f64) -> Reactions {
+        Reactions { mean, literal: 0.0, by_side: [mean; 2], times: Vec::new() }
+    }
+
+    fn world(success: f64) -> InWorld {
+        InWorld { success, failures: [0; 3], reaction_time: 0.0, branches: Vec::new() }
+    }
+
+    fn network(condition: &'static str, seed: u64, (own, other, ers): (f64, f64, f64)) -> Findings {
+        let wide = condition == "wide";
+        let jitter = 0.1 * seed as f64;
+        let peak = Peak { steps: 9, over_median: if wide { 1.1 } else { 7.0 } };
+        let regressed = || Regressed {
+            reactions: reactions(ers + jitter),
+            causal: reactions(ers + 5.0),
+            milliseconds: [0.2, 0.4, 0.9],
+        };
+        Findings {
+            condition,
+            seed,
+            training: TrainingFacts {
+                network: "S-MTRNN",
+                folder: String::new(),
+                epochs: 1,
+                nll: None,
+                mse: None,
+                seconds: 20.0,
+                diverged: None,
+            },
+            closed_loop: ClosedLoop {
+                regenerated: if wide { 32 } else { 1 },
+                orders: Vec::new(),
+                distinct_from_one: if wide { 1 } else { 15 },
+                orders_from_one: Vec::new(),
+                variance_open: peak,
+                variance_closed: peak,
+            },
+            corresponding: reactions(own + jitter),
+            other: reactions(other + jitter),
+            regression: wide.then(|| Regression {
+                default: regressed(),
+                thesis: regressed(),
+                without_arm: regressed(),
+                world: world(0.95),
+                scan: vec![(ers, 0.2); scan::settings(8).len()],
+            }),
+            world: Some(world(if wide { 0.5 } else { 1.0 })),
+        }
+    }
+
+    fn all(wide: (f64, f64, f64)) -> Vec<Findings> {
+        let narrow = (1..=4).map(|seed| network("narrow", seed, (19.0, 19.0, 0.0)));
+        narrow.chain((1..=4).map(|seed| network("wide", seed, wide))).collect()
+    }
+
+    #[test]
+    fn every_goal_is_met_by_what_the_thesis_found_and_missed_by_its_opposite() {
+        let good = Overall::of(&all((0.0, 50.0, 6.0)), 8, 900.0);
+        let missed: Vec<&str> = good.goals.iter().filter(|goal| !goal.met).map(|goal| goal.goal).collect();
+        assert!(missed.is_empty(), "{missed:?}");
+        assert_eq!(good.comparisons.len(), 6);
+        assert_eq!(good.scan[0].values, [6.0; 4]);
+
+        // A wide network that is late with its own order, quick with others, and no better for error regression.
+        let bad = Overall::of(&all((30.0, 10.0, 20.0)), 8, 2000.0);
+        let met = |goal: &str| bad.goals.iter().find(|one| one.goal == goal).unwrap().met;
+        for goal in [
+            "wide: reaction time, corresponding",
+            "wide: reaction time with error regression",
+            "wide: other against corresponding",
+            "corresponding: narrow against wide",
+            "other: wide against narrow",
+            "wide, other: without against with regression",
+            "other: narrow against wide with regression",
+            "time of everything",
+        ] {
+            assert!(!met(goal), "{goal}");
+        }
+        assert!(met("narrow: corresponding against other"));
+    }
+
+    #[test]
+    fn a_single_network_has_measures_and_no_comparisons() {
+        let one = Overall::of(&[network("narrow", 1, (19.0, 19.0, 0.0))], 8, 1.0);
+        assert!(one.comparisons.is_empty() && one.scan.is_empty());
+        assert_eq!(one.summary.iter().find(|summary| summary.key == "narrow_other").unwrap().values.len(), 1);
+    }
+}

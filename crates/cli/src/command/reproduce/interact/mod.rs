@@ -88,10 +88,10 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     let cores = shared.engine()?.threads();
     let interrupt = Interrupt::listen();
     let bars = MultiProgress::new();
-    let one = |job: u64, threads: usize| -> Result<Option<Done>> {
-        let (index, seed) = jobs[job as usize];
+    let one = |job: usize| -> Result<Option<Done>> {
+        let (index, seed) = jobs[job];
         let (condition, data) = (&conditions[index], &recordings[index]);
-        let engine = Engine::new(threads, shared.instruction_set())?;
+        let engine = Engine::new(if jobs.len() == 1 { cores } else { 1 }, shared.instruction_set())?;
         let how = (arguments.epochs, arguments.set.as_slice());
         let experiment = condition.experiment(&path, arguments.preset, seed, how)?;
         let run = format!("{}-{seed}", condition.key);
@@ -119,8 +119,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         };
         Ok((!interrupt.asked()).then_some(Done { findings, experiment, material }))
     };
-    let numbers: Vec<u64> = (0..jobs.len() as u64).collect();
-    let Some(done) = seeds::side_by_side(&numbers, cores, one)? else {
+    let Some(done) = seeds::one_by_one(jobs.len(), cores, one)? else {
         shared.say("interrupted: what was learned is saved, and the same command goes on with it");
         return Ok(Ending::Interrupted);
     };

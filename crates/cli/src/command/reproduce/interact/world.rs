@@ -50,7 +50,7 @@ pub struct Snapshot {
     pub means: Vec<Vec<f64>>,
     /// The contexts that go with them.
     pub contexts: Vec<Vec<f64>>,
-    /// ln L_reg before and after.
+    /// u at the window's tail.
     pub tail: Vec<f64>,
 }
 
