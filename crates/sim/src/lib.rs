@@ -5,6 +5,8 @@
 //! reads a clock, and the same calls in the same order give the same bits.
 
 pub mod camera;
+#[cfg(test)]
+mod description_tests;
 pub mod error;
 pub mod gaze;
 pub mod interaction;
