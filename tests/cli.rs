@@ -2,6 +2,8 @@
 
 #[path = "cli/experiments.rs"]
 mod experiments;
+#[path = "cli/extremes.rs"]
+mod extremes;
 #[path = "cli/reaching.rs"]
 mod reaching;
 #[path = "cli/recordings.rs"]

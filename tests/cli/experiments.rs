@@ -9,7 +9,10 @@ fn a_run_folder_holds_all_that_is_promised() {
     assert!(out.contains("nats per step and channel") && out.contains("a model that always predicts"), "{out}");
     assert!(out.contains("standard deviations correlate"), "{out}");
     let history = place.text("runs/sine/history.csv");
-    assert!(history.starts_with("epoch,nll,mse,rate_shared,rate_initial,gradient_norm,seconds\n"), "{history}");
+    assert!(
+        history.starts_with("epoch,nll,mse,rate_shared,rate_initial,gradient_norm,seconds,recoveries\n"),
+        "{history}"
+    );
     assert_eq!(epochs(&history), (0..=120).collect::<Vec<_>>());
     let resolved = place.text("runs/sine/experiment.toml");
     for explicit in ["seed = 1", "sequences = 1", "momentum = 0.9", "variance_floor = 0.0", "history_every = 1"] {
@@ -173,14 +176,16 @@ fn every_experiment_that_is_shipped_is_valid() {
 #[test]
 fn divergence_is_told_rolled_back_and_saved() {
     let place = Place::with(SINE);
-    let (_, told) = place.fails(3, "train sine.toml --set training.momentum.rate=1e9");
+    let (_, told) =
+        place.fails(3, "train sine.toml --set training.momentum.rate=1e9 --set training.on_divergence=stop");
     assert!(told.contains("diverged at epoch") && told.contains("is not finite"), "{told}");
     assert!(told.contains("rolled back to epoch"), "{told}");
     let seen = place.json("inspect runs/sine --json");
     assert!(seen["score"]["nll"].is_number(), "{seen}");
     let generated = place.ok("generate runs/sine --best --steps 3");
     assert_eq!(generated.lines().count(), 4);
-    let output = place.run("train sine.toml --out r --set training.momentum.rate=1e9 --json");
+    let output =
+        place.run("train sine.toml --out r --set training.momentum.rate=1e9 --set training.on_divergence=stop --json");
     let result: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(result["outcome"], "diverged");
     assert!(result["divergence"]["quantity"].is_string(), "{result}");

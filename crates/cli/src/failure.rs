@@ -15,7 +15,7 @@ use std::path::Path;
 
 use miette::{Diagnostic, NamedSource, SourceSpan};
 
-use crate::files::FileError;
+use crate::files::{FileError, disk_help};
 
 /// How a command ended that did what it could.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,7 +62,7 @@ pub enum Failure {
         source: io::Error,
         /// What to do.
         #[help]
-        help: Option<String>,
+        help: Option<&'static str>,
     },
 
     /// The request is clear, but would do harm.
@@ -133,13 +133,7 @@ impl Failure {
 
     /// The system's refusal to `verb` ("read", "write", ...) `path`.
     pub fn disk(verb: &str, path: &Path, source: io::Error) -> Self {
-        let help = match source.kind() {
-            io::ErrorKind::NotFound => Some("check the spelling; paths start from the current folder".to_owned()),
-            io::ErrorKind::PermissionDenied => Some("check who owns the file and its folder".to_owned()),
-            io::ErrorKind::StorageFull => Some("make room on the disk and try again".to_owned()),
-            _ => None,
-        };
-        Self::Disk { action: format!("{verb} {}", path.display()), source, help }
+        Self::Disk { action: format!("{verb} {}", path.display()), help: disk_help(source.kind()), source }
     }
 
     /// A request that would do harm.

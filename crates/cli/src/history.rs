@@ -13,7 +13,7 @@ use scrnn::learning::EpochReport;
 use crate::failure::{Failure, Result};
 use crate::run_folder::{HISTORY, RunFolder};
 
-const HEADER: &str = "epoch,nll,mse,rate_shared,rate_initial,gradient_norm,seconds\n";
+const HEADER: &str = "epoch,nll,mse,rate_shared,rate_initial,gradient_norm,seconds,recoveries\n";
 
 /// What a row says that learning curves are drawn from.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,6 +24,8 @@ pub struct Row {
     pub nll: Option<f64>,
     /// Mean squared error per step and channel, in scaled units.
     pub mse: f64,
+    /// How often the training was brought back so far.
+    pub recoveries: u64,
 }
 
 /// The rows of a history file, up to the first that is not whole.
@@ -34,7 +36,9 @@ pub fn read(path: &Path) -> Result<Vec<Row>> {
         let epoch = fields.next()?.parse().ok()?;
         let nll = fields.next()?;
         let mse = fields.next()?.parse().ok()?;
-        Some(Row { epoch, nll: nll.parse().ok(), mse })
+        // Files from before trainings were brought back lack the last column.
+        let recoveries = fields.nth(4).map_or(Some(0), |field| field.parse().ok())?;
+        Some(Row { epoch, nll: nll.parse().ok(), mse, recoveries })
     };
     let (kept, _) = rows_up_to(&text, u64::MAX);
     Ok(kept.lines().map_while(row).collect())
@@ -81,10 +85,13 @@ impl History {
         }
         self.last_epoch = Some(report.epoch);
         let nll = report.nll.map_or(String::new(), |nll| format!("{nll:?}"));
-        let EpochReport { epoch, mse, rate_shared, rate_initial, gradient_norm, .. } = report;
+        let EpochReport { epoch, mse, rate_shared, rate_initial, gradient_norm, recoveries, .. } = report;
         let seconds = self.seconds_before + seconds;
-        writeln!(self.waiting, "{epoch},{nll},{mse:?},{rate_shared:?},{rate_initial:?},{gradient_norm:?},{seconds:.3}")
-            .expect("a string takes all");
+        writeln!(
+            self.waiting,
+            "{epoch},{nll},{mse:?},{rate_shared:?},{rate_initial:?},{gradient_norm:?},{seconds:.3},{recoveries}"
+        )
+        .expect("a string takes all");
     }
 
     /// Appends the waiting rows to the file.
@@ -130,10 +137,20 @@ mod tests {
     fn learning_curves_are_read_back() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(HISTORY);
-        let text = format!("{HEADER}0,1.5,0.25,1e-7,1e-4,2.0,0.000\n5,,0.125,1e-7,1e-4,2.0,0.100\n9,0.5,0.");
+        let text = format!("{HEADER}0,1.5,0.25,1e-7,1e-4,2.0,0.000,0\n5,,0.125,1e-7,1e-4,2.0,0.100,2\n9,0.5,0.");
         std::fs::write(&path, text).unwrap();
-        let rows = [Row { epoch: 0, nll: Some(1.5), mse: 0.25 }, Row { epoch: 5, nll: None, mse: 0.125 }];
+        let rows = [
+            Row { epoch: 0, nll: Some(1.5), mse: 0.25, recoveries: 0 },
+            Row { epoch: 5, nll: None, mse: 0.125, recoveries: 2 },
+        ];
         assert_eq!(read(&path).unwrap(), rows);
+        // A file of an earlier version.
+        std::fs::write(
+            &path,
+            "epoch,nll,mse,rate_shared,rate_initial,gradient_norm,seconds\n0,1.5,0.25,1e-7,1e-4,2.0,0.0\n",
+        )
+        .unwrap();
+        assert_eq!(read(&path).unwrap(), rows[..1]);
     }
 
     #[test]

@@ -81,6 +81,15 @@ impl Progress {
         }
     }
 
+    /// Says something that stays.
+    pub fn say(&self, message: &str) {
+        match &self.display {
+            Display::Quiet => {}
+            Display::Lines => eprintln!("{}{message}", self.label),
+            Display::Bar(bar) => bar.println(format!("{}{message}", self.label)),
+        }
+    }
+
     /// Leaves the terminal in order.
     pub fn finish(&self) {
         if let Display::Bar(bar) = &self.display {

@@ -14,6 +14,9 @@ use crate::notes::Notes;
 use crate::run_folder::{BEST, CHECKPOINT};
 use crate::source;
 
+/// Scaled samples from here on are refused: predictions lie between -1 and 1.
+const TOO_FAR: f64 = 1e12;
+
 /// A checkpoint with what the program noted in it.
 #[derive(Debug)]
 pub struct Trained {
@@ -76,10 +79,23 @@ impl Trained {
         Ok(data)
     }
 
-    /// Checks that `data` have the channels that were learned.
+    /// Checks that `data` have the channels that were learned, and are numbers that the network can be told.
     pub fn check_channels(&self, data: &Dataset, path: &Path) -> Result<()> {
         let learned = &self.checkpoint.channels;
         if data.channels().len() == learned.len() {
+            let scaled = self.checkpoint.scaling.apply(data);
+            let n = learned.len();
+            for sequence in scaled.sequences() {
+                if let Some(at) = sequence.values().iter().position(|value| value.abs() >= TOO_FAR || value.is_nan()) {
+                    let (name, step, channel) = (&sequence.name, at / n + 1, &learned[at % n]);
+                    let message = format!(
+                        "{}: sequence {name}, step {step}, channel {channel} lies {:e} times as far out as anything that was learned",
+                        path.display(),
+                        sequence.values()[at].abs()
+                    );
+                    return Err(Failure::input(message, "are these data in the units of those that were learned?"));
+                }
+            }
             return Ok(());
         }
         let count = |channels: &[String]| format!("{} ({})", channels.len(), channels.join(", "));

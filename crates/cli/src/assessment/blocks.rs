@@ -41,11 +41,31 @@ pub fn learning_curves(file: &str, title: &str, runs: &[(String, &[Row])], floor
     } else {
         "Mean squared error per step and channel, as a power of ten: lower is better."
     };
+    let caption = format!("{caption}{}", told_recoveries(runs));
     let y_label = if with_variance { "nll" } else { "log10 of the squared error" };
     let chart =
         Chart { columns: 1, aspect: 2.2, x_label: "epoch".into(), y_label: y_label.into(), panels: vec![panel] };
     let (file, title, thesis) = (file.to_owned(), title.to_owned(), String::new());
-    Block::Figure(Box::new(Figure { file, title, caption: caption.into(), thesis, drawing: chart.into() }))
+    Block::Figure(Box::new(Figure { file, title, caption, thesis, drawing: chart.into() }))
+}
+
+/// Which runs left their course and were brought back, and when.
+fn told_recoveries(runs: &[(String, &[Row])]) -> String {
+    let mut told = String::new();
+    for (name, rows) in runs {
+        let pairs = rows.iter().zip(rows.iter().skip(1));
+        let epochs: Vec<String> =
+            pairs.filter(|(a, b)| b.recoveries > a.recoveries).map(|(_, b)| b.epoch.to_string()).collect();
+        let times = rows.last().map_or(0, |row| row.recoveries);
+        if times > 0 {
+            let list = if epochs.len() > 8 { format!("{}, ...", epochs[..8].join(", ")) } else { epochs.join(", ") };
+            told += &format!(
+                " Of {name}, training left its course {times} times (epochs {list}) and was brought back to the best network, \
+                 each time at half the rate."
+            );
+        }
+    }
+    told
 }
 
 /// The nll beside simple models, and predicted beside observed standard deviations.

@@ -10,8 +10,8 @@ use scrnn::topology::{self, Prediction, Topology};
 use scrnn_sim::tutor::Tutoring;
 
 use super::{
-    Adam, AdaptiveRate, Data, Experiment, Group, Momentum, OptimiserName, PriorStep, ScalingChoice, ScalingConstants,
-    ScalingName, ScalingRanges, TaskName, Training,
+    Adam, AdaptiveRate, Data, Experiment, Group, Momentum, OnDivergence, OptimiserName, PriorStep, ScalingChoice,
+    ScalingConstants, ScalingName, ScalingRanges, TaskName, Training,
 };
 use crate::failure::{Failure, Result};
 use crate::files::Selection;
@@ -99,6 +99,10 @@ impl Experiment {
             initial_state_variance: self.network.initial_state_variance,
             optimiser,
             recompute: training.recompute,
+            on_divergence: match training.on_divergence {
+                OnDivergence::Recover => learning::OnDivergence::Recover,
+                OnDivergence::Stop => learning::OnDivergence::Stop,
+            },
         }
     }
 }
@@ -133,6 +137,12 @@ impl Data {
 
     /// The scaling that the experiment asks for, fitted to `data` if that is asked for.
     pub fn scaling_for(&self, data: &Dataset) -> Result<Scaling> {
+        let scaling = self.chosen_scaling(data)?;
+        check_reach(data, &scaling)?;
+        Ok(scaling)
+    }
+
+    fn chosen_scaling(&self, data: &Dataset) -> Result<Scaling> {
         let channels = data.channels().len();
         let fits = |what: &str, count: usize| {
             if count == channels {
@@ -154,6 +164,28 @@ impl Data {
             Some(ScalingChoice::Named(ScalingName::None)) | None => Ok(Scaling::identity(channels)),
         }
     }
+}
+
+/// Numbers up to this, and as little as its inverse apart, have variances that float64 can hold.
+const REACH: f64 = 1e150;
+
+/// Refuses channels whose samples are too large, or too close to each other, to compute their variances.
+fn check_reach(data: &Dataset, scaling: &Scaling) -> Result<()> {
+    for (i, name) in data.channels().iter().enumerate() {
+        let samples = || data.sequences().iter().flat_map(|s| s.values().iter().skip(i).step_by(data.channels().len()));
+        let largest = samples().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        let scale = scaling.scale()[i].abs();
+        let help = "bring the data to other units, or leave the channel out with `channels` in [data]";
+        if largest > REACH {
+            return Err(Failure::input(format!("channel {name} reaches {largest:e}; needed: at most {REACH:e}"), help));
+        }
+        if !(1.0 / REACH..=REACH).contains(&scale) || samples().any(|&x| scaling.to_scaled(i, x).abs() > REACH) {
+            let message =
+                format!("the samples of channel {name} cannot be scaled: a factor of {scale:e} would be needed");
+            return Err(Failure::input(message, help));
+        }
+    }
+    Ok(())
 }
 
 impl Training {

@@ -8,6 +8,8 @@ mod conversion;
 mod difference;
 mod overrides;
 mod reading;
+#[cfg(test)]
+mod reading_tests;
 
 use std::path::PathBuf;
 
@@ -208,12 +210,27 @@ pub struct Training {
     /// learned stays the same to the bit.
     #[serde(default)]
     pub recompute: bool,
+    /// What to do when training leaves its course.
+    #[serde(default)]
+    pub on_divergence: OnDivergence,
     /// Options of "momentum".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub momentum: Option<Momentum>,
     /// Options of "adam".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub adam: Option<Adam>,
+}
+
+/// What to do when training leaves its course.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum OnDivergence {
+    /// Goes back to the best network, halves the rate and goes on: when a value is not finite, and when the nll rises by more
+    /// than 10 nats above its best. After twenty times it stops.
+    #[default]
+    Recover,
+    /// Stops when a value is not finite, at the last good epoch. The rule of ascent is never interfered with.
+    Stop,
 }
 
 /// The rules of ascent.

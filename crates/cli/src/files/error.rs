@@ -1,6 +1,7 @@
 //! What can be wrong with a data file: where, what was found, what is needed.
 
 use std::io;
+use std::path::Path;
 
 use miette::{Diagnostic, NamedSource, SourceSpan};
 
@@ -17,6 +18,9 @@ pub enum FileError {
         /// What the system said.
         #[source]
         source: io::Error,
+        /// What to do.
+        #[help]
+        help: Option<&'static str>,
     },
 
     /// The extension does not tell a format.
@@ -183,6 +187,28 @@ pub enum FileError {
     },
 }
 
+impl FileError {
+    /// The system's refusal to `verb` the file at `path`.
+    pub fn disk(verb: &'static str, path: &Path, source: io::Error) -> Self {
+        Self::Disk { verb, path: path.display().to_string(), help: disk_help(source.kind()), source }
+    }
+}
+
+/// What to do about a refusal of the operating system.
+pub fn disk_help(kind: io::ErrorKind) -> Option<&'static str> {
+    match kind {
+        io::ErrorKind::NotFound => {
+            Some("check the spelling, and that the folder is still there; paths start from the current folder")
+        }
+        io::ErrorKind::PermissionDenied => Some("check who owns the file and its folder"),
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Some("make room on the disk and try again"),
+        io::ErrorKind::FileTooLarge => Some("a limit forbids files of this size: `ulimit -f` shows it"),
+        io::ErrorKind::ReadOnlyFilesystem => Some("the disk is mounted for reading only: choose another folder"),
+        io::ErrorKind::NotADirectory => Some("part of the path is a file, not a folder"),
+        _ => None,
+    }
+}
+
 /// A line of a text file that cannot be read, with the text around it.
 #[derive(Debug, thiserror::Error, Diagnostic)]
 #[error("{path}, line {line}: {problem}")]
@@ -258,6 +284,13 @@ pub enum RecordingProblem {
     /// Other contents.
     #[error("this is not an MCAP file")]
     NotMcap,
+
+    /// A format that did not exist when this was written.
+    #[error("version {found} of MCAP; known: 0")]
+    Version {
+        /// The version, a character.
+        found: String,
+    },
 
     /// No end.
     #[error("the recording is cut off")]

@@ -24,7 +24,7 @@ mod replace;
 mod text;
 mod text_out;
 
-pub use error::{ArrayProblem, FileError, LineError, LineProblem, RecordingProblem};
+pub use error::{ArrayProblem, FileError, LineError, LineProblem, RecordingProblem, disk_help};
 pub use replace::{HALF_WRITTEN, replace};
 
 /// Something known of each sample, to be written beside others: the mean, the variance, the contexts, ...
@@ -128,10 +128,18 @@ pub fn read(path: &Path) -> Result<Dataset, FileError> {
 /// # Errors
 /// [`FileError`] tells what is wrong, and where.
 pub fn read_part(path: &Path, selection: &Selection) -> Result<Dataset, FileError> {
-    let format = Format::of(path)?;
-    let name = path.display().to_string();
-    let bytes = std::fs::read(path).map_err(|source| FileError::Disk { verb: "read", path: name.clone(), source })?;
-    format.parse(&name, &bytes, selection)
+    // The name is judged first: the mistake may be in it.
+    Format::of(path)?;
+    let bytes = std::fs::read(path).map_err(|source| FileError::disk("read", path, source))?;
+    parse_as(path, &bytes, selection)
+}
+
+/// Reads the part of a data set that is meant, from the bytes of the file called `path`.
+///
+/// # Errors
+/// [`FileError`] tells what is wrong, and where.
+pub fn parse_as(path: &Path, bytes: &[u8], selection: &Selection) -> Result<Dataset, FileError> {
+    Format::of(path)?.parse(&path.display().to_string(), bytes, selection)
 }
 
 /// Writes the fields side by side, as a whole or not at all. All need the same number of sequences, of the same lengths.
@@ -189,5 +197,7 @@ fn collect(path: &str, channels: Vec<String>, sequences: Vec<(String, Vec<f64>)>
     set.map_err(|source| FileError::Data { path: path.to_owned(), source })
 }
 
+#[cfg(test)]
+mod memory_tests;
 #[cfg(test)]
 mod tests;

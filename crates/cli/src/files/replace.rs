@@ -33,7 +33,7 @@ pub fn replace(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
         File::open(folder)?.sync_all()?;
         Ok(())
     };
-    write().map_err(|source| FileError::Disk { verb: "write", path: path.display().to_string(), source })
+    write().map_err(|source| FileError::disk("write", path, source))
 }
 
 #[cfg(test)]

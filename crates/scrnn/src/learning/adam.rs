@@ -44,6 +44,8 @@ impl Moments {
 #[derive(Debug, Clone)]
 pub(super) struct AdamRule {
     options: Adam,
+    /// The guard's factor; 1 unless the training left its course.
+    pub guarded: f64,
     shared: Moments,
     initial: Moments,
     mean: Moments,
@@ -71,6 +73,7 @@ impl AdamRule {
         let s = variance.sqrt().min(1.0);
         Self {
             options,
+            guarded: 1.0,
             shared: Moments::new(parameters),
             initial: Moments::new(states.values().len()),
             mean: Moments::new(states.mean().len()),
@@ -85,6 +88,10 @@ impl AdamRule {
 
     /// The rate of the update that follows epoch `epoch`.
     pub fn rate(&self, epoch: u64) -> f64 {
+        self.guarded * self.scheduled_rate(epoch)
+    }
+
+    fn scheduled_rate(&self, epoch: u64) -> f64 {
         let Adam { rate, warm_up, final_rate, .. } = self.options;
         let warm = (warm_up * self.epochs as f64).round();
         let at = epoch as f64;
@@ -159,6 +166,7 @@ impl AdamRule {
             own.first.copy_from_slice(&other.first);
             own.second.copy_from_slice(&other.second);
         }
+        self.guarded = other.guarded;
     }
 
     /// What has to be kept to go on.

@@ -22,11 +22,29 @@ pub struct Divergence {
     pub step: Option<usize>,
     /// What was not finite: `context`, `mean`, `variance`, `log-likelihood`, or `gradient of` a block of parameters.
     pub quantity: String,
+    /// Where all values were finite: by how much the nll rose above its best, in nats per step and channel. The sequence is then the
+    /// least likely one.
+    pub rise: Option<f64>,
 }
 
 impl fmt::Display for Divergence {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "the training diverged at epoch {}: the {} is not finite", self.epoch, self.quantity)?;
+        match self.rise {
+            Some(rise) => {
+                write!(
+                    f,
+                    "the training diverged at epoch {}: the nll rose by {rise:.1} nats above its best",
+                    self.epoch
+                )?;
+                if let Some(sequence) = self.sequence {
+                    write!(f, ", most in sequence {}", sequence + 1)?;
+                }
+                return write!(f, "; rolled back to epoch {}", self.rolled_back_to);
+            }
+            None => {
+                write!(f, "the training diverged at epoch {}: the {} is not finite", self.epoch, self.quantity)?;
+            }
+        }
         if let Some(sequence) = self.sequence {
             write!(f, " in sequence {}", sequence + 1)?;
         }
@@ -41,7 +59,17 @@ impl Divergence {
     /// Finds the place in a sequence whose likelihood is not finite.
     pub(super) fn in_sequence(epoch: u64, network: &Network, states: &InitialStates, data: &Dataset, s: usize) -> Self {
         let (step, quantity) = place(network, states.sequence(s), data, s);
-        Self { epoch, rolled_back_to: epoch.saturating_sub(1), sequence: Some(s), step, quantity: quantity.to_owned() }
+        Self { quantity: quantity.to_owned(), step, ..Self::at(epoch, Some(s)) }
+    }
+
+    /// A likelihood that collapsed, most so in sequence `s`.
+    pub(super) fn of_likelihood(epoch: u64, s: usize, rise: f64) -> Self {
+        Self { quantity: "log-likelihood".to_owned(), rise: Some(rise), ..Self::at(epoch, Some(s)) }
+    }
+
+    fn at(epoch: u64, sequence: Option<usize>) -> Self {
+        let rolled_back_to = epoch.saturating_sub(1);
+        Self { epoch, rolled_back_to, sequence, step: None, quantity: String::new(), rise: None }
     }
 
     /// Finds the block of a gradient that is not finite.
@@ -49,7 +77,7 @@ impl Divergence {
         let block =
             gradients.as_slice().iter().position(|g| !g.is_finite()).and_then(|index| gradients.block_at(index));
         let quantity = format!("gradient of {}", block.map_or("initial_state", |block| block.name()));
-        Self { epoch, rolled_back_to: epoch.saturating_sub(1), sequence: None, step: None, quantity }
+        Self { quantity, ..Self::at(epoch, None) }
     }
 }
 

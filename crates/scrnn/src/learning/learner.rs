@@ -2,8 +2,9 @@
 
 use super::adam::AdamRule;
 use super::divergence::Divergence;
+use super::guard::{self, Guard, Recovery};
 use super::momentum::MomentumRule;
-use super::plan::{Optimiser, Plan};
+use super::plan::{OnDivergence, Optimiser, Plan};
 use super::state::Fields;
 use crate::batch::Item;
 use crate::checkpoint::OptimiserState;
@@ -42,6 +43,8 @@ pub struct EpochReport {
     pub rate_initial: f64,
     /// Length of the gradient of ln L_out per step and channel in the shared parameters.
     pub gradient_norm: f64,
+    /// How often the training was brought back so far.
+    pub recoveries: u64,
 }
 
 /// Watches a training, and can stop it.
@@ -49,6 +52,9 @@ pub trait Observer {
     /// Called after each evaluation, before the update. A run of N epochs makes N + 1 calls, the last with the final
     /// parameters. `learner` holds what was evaluated: saved here and restored later, a training goes on bit for bit.
     fn epoch(&mut self, report: &EpochReport, learner: &Learner) -> Control;
+
+    /// Called when a training that left its course was brought back, before it goes on.
+    fn recovered(&mut self, _recovery: &Recovery) {}
 }
 
 impl<F: FnMut(&EpochReport, &Learner) -> Control> Observer for F {
@@ -64,37 +70,46 @@ pub enum Outcome {
     Finished,
     /// The observer stopped it.
     Stopped,
-    /// A value was not finite; the learner is back at the last good state.
+    /// A value was not finite, or the training could not be brought back often enough; the learner is back at the last good
+    /// state.
     Diverged(Divergence),
 }
 
 #[derive(Debug, Clone)]
-enum Rule {
+pub(super) enum Rule {
     Momentum(MomentumRule),
     Adam(AdamRule),
 }
 
 impl Rule {
-    fn fields(&mut self) -> Fields<'_> {
+    pub fn fields(&mut self) -> Fields<'_> {
         match self {
             Self::Momentum(rule) => rule.fields(),
             Self::Adam(rule) => rule.fields(),
+        }
+    }
+
+    /// Multiplies all rates, in place of what the guard said before.
+    fn slow_down(&mut self, factor: f64) {
+        match self {
+            Self::Momentum(rule) => rule.guarded = factor,
+            Self::Adam(rule) => rule.guarded = factor,
         }
     }
 }
 
 /// The part of a learner that an update changes.
 #[derive(Debug, Clone)]
-struct State {
-    network: Network,
-    initial_states: InitialStates,
-    rule: Rule,
-    epoch: u64,
+pub(super) struct State {
+    pub network: Network,
+    pub initial_states: InitialStates,
+    pub rule: Rule,
+    pub epoch: u64,
 }
 
 impl State {
     /// Takes over another state of the same training; allocates nothing.
-    fn copy_from(&mut self, other: &Self) {
+    pub fn copy_from(&mut self, other: &Self) {
         self.network.parameters.as_mut_slice().copy_from_slice(other.network.parameters.as_slice());
         self.initial_states.values_mut().copy_from_slice(other.initial_states.values());
         self.initial_states.mean_mut().copy_from_slice(other.initial_states.mean());
@@ -112,6 +127,7 @@ impl State {
 pub struct Learner {
     state: State,
     last_good: State,
+    guard: Option<Guard>,
     plan: Plan,
     data: Dataset,
     terms: f64,
@@ -160,7 +176,9 @@ impl Learner {
         let objective = Objective::new(topology, &items, plan.recompute, engine);
         let terms = (total * topology.channels()) as f64;
         let state = State { network, initial_states, rule, epoch: 0 };
-        Ok(Self { last_good: state.clone(), state, plan, data: data.clone(), terms, objective, evaluated: false })
+        let guard = (plan.on_divergence == OnDivergence::Recover).then(|| Guard::new(&state));
+        let last_good = state.clone();
+        Ok(Self { last_good, state, guard, plan, data: data.clone(), terms, objective, evaluated: false })
     }
 
     /// Goes on from a checkpoint, of which `new` got the network and the initial states.
@@ -170,6 +188,11 @@ impl Learner {
     pub fn restore(&mut self, epoch: u64, state: &OptimiserState) -> Result<()> {
         self.state.rule.fields().load(state)?;
         self.state.epoch = epoch;
+        if let Some(guard) = &mut self.guard {
+            guard.safe.copy_from(&self.state);
+            guard.load(state)?;
+            self.state.rule.slow_down(guard.rate_factor());
+        }
         self.evaluated = false;
         Ok(())
     }
@@ -192,6 +215,12 @@ impl Learner {
         self.state.epoch
     }
 
+    /// How often the training was brought back.
+    #[must_use]
+    pub fn recoveries(&self) -> u64 {
+        self.guard.as_ref().map_or(0, |guard| guard.recoveries)
+    }
+
     /// The plan.
     #[must_use]
     pub fn plan(&self) -> &Plan {
@@ -201,7 +230,11 @@ impl Learner {
     /// The optimiser's memory.
     #[must_use]
     pub fn optimiser_state(&self) -> OptimiserState {
-        self.state.rule.clone().fields().save()
+        let mut state = self.state.rule.clone().fields().save();
+        if let Some(guard) = &self.guard {
+            guard.save(&mut state);
+        }
+        state
     }
 
     /// ln L_out of each sequence at the last evaluation, in nats; -E without variance units.
@@ -216,11 +249,18 @@ impl Learner {
         loop {
             self.evaluate();
             if let Some(divergence) = self.divergence() {
-                self.state.copy_from(&self.last_good);
+                if let Some(recovery) = self.recover(&divergence) {
+                    observer.recovered(&recovery);
+                    continue;
+                }
+                self.state.copy_from(self.guard.as_ref().map_or(&self.last_good, |guard| &guard.safe));
                 self.evaluated = false;
                 return Outcome::Diverged(divergence);
             }
             self.last_good.copy_from(&self.state);
+            if let Some(guard) = &mut self.guard {
+                guard.compare(&self.state, self.objective.ln_likelihood.iter().sum());
+            }
             let control = observer.epoch(&self.report(), self);
             if self.state.epoch >= self.plan.epochs {
                 return Outcome::Finished;
@@ -241,6 +281,19 @@ impl Learner {
         }
     }
 
+    /// Goes back to the best state at a lower rate, unless that was done too often.
+    fn recover(&mut self, divergence: &Divergence) -> Option<Recovery> {
+        let guard =
+            self.guard.as_mut().filter(|guard| guard.recoveries < guard::MOST && guard.ln_likelihood.is_finite())?;
+        guard.recoveries += 1;
+        let epoch = self.state.epoch;
+        self.state.copy_from(&guard.safe);
+        self.state.epoch = epoch;
+        self.state.rule.slow_down(guard.rate_factor());
+        self.evaluated = false;
+        Some(Recovery { divergence: divergence.clone(), number: guard.recoveries, rate_factor: guard.rate_factor() })
+    }
+
     fn divergence(&self) -> Option<Divergence> {
         let State { network, initial_states, epoch, .. } = &self.state;
         let finite =
@@ -251,12 +304,26 @@ impl Learner {
             let gradients = &self.objective.gradients;
             let all = gradients.as_slice().iter().chain(&self.objective.initial);
             if all.into_iter().all(|g| g.is_finite()) {
-                return None;
+                Divergence::of_likelihood(*epoch, self.least_likely(), self.rise()?)
+            } else {
+                Divergence::in_gradient(*epoch, gradients)
             }
-            Divergence::in_gradient(*epoch, gradients)
         };
-        divergence.rolled_back_to = self.last_good.epoch;
+        divergence.rolled_back_to = self.guard.as_ref().map_or(self.last_good.epoch, |guard| guard.safe.epoch);
         Some(divergence)
+    }
+
+    /// How far the nll rose above its best, where the guard objects to it.
+    fn rise(&self) -> Option<f64> {
+        self.guard.as_ref()?.rise(self.objective.ln_likelihood.iter().sum(), self.terms)
+    }
+
+    /// The sequence of the lowest likelihood a step.
+    fn least_likely(&self) -> usize {
+        let delay = self.state.network.topology.delay();
+        let steps = self.data.sequences().iter().map(|sequence| (sequence.len() - delay) as f64);
+        let each = self.objective.ln_likelihood.iter().zip(steps).map(|(ln_likelihood, steps)| ln_likelihood / steps);
+        each.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(s, _)| s)
     }
 
     fn report(&self) -> EpochReport {
@@ -276,6 +343,7 @@ impl Learner {
             rate_shared,
             rate_initial,
             gradient_norm: norm / self.terms,
+            recoveries: self.recoveries(),
         }
     }
 

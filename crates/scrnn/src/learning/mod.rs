@@ -4,14 +4,18 @@
 
 mod adam;
 mod divergence;
+mod guard;
 mod learner;
 mod momentum;
 mod plan;
 mod state;
 
 pub use divergence::Divergence;
+pub use guard::Recovery;
 pub use learner::{Control, EpochReport, Learner, Observer, Outcome};
-pub use plan::{Adam, AdaptiveRate, Momentum, Optimiser, Plan, PriorStep};
+pub use plan::{Adam, AdaptiveRate, Momentum, OnDivergence, Optimiser, Plan, PriorStep};
 
+#[cfg(test)]
+mod extremes_tests;
 #[cfg(test)]
 mod tests;

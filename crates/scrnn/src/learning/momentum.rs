@@ -30,6 +30,8 @@ pub(super) struct MomentumRule {
     mean: Vec<f64>,
     /// The factor of the adaptive rate; 1 otherwise.
     pub factor: f64,
+    /// The guard's factor; 1 unless the training left its course.
+    pub guarded: f64,
     learns: Vec<bool>,
     /// alpha_share and alpha_init for a factor of 1.
     rates: (f64, f64),
@@ -52,6 +54,7 @@ impl MomentumRule {
             initial: vec![0.0; states.values().len()],
             mean: vec![0.0; states.mean().len()],
             factor: 1.0,
+            guarded: 1.0,
             learns: topology.per_unit(|group| group.learns_initial_state).collect(),
             variance,
         }
@@ -59,7 +62,8 @@ impl MomentumRule {
 
     /// alpha_share, alpha_init.
     pub fn rates(&self) -> (f64, f64) {
-        (self.rates.0 * self.factor, self.rates.1 * self.factor)
+        let factor = self.factor * self.guarded;
+        (self.rates.0 * factor, self.rates.1 * factor)
     }
 
     /// Delta_n from the gradients of ln L_out at `states`.
@@ -116,6 +120,7 @@ impl MomentumRule {
         self.initial.copy_from_slice(&other.initial);
         self.mean.copy_from_slice(&other.mean);
         self.factor = other.factor;
+        self.guarded = other.guarded;
     }
 
     /// What has to be kept to go on.

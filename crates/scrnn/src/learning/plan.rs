@@ -14,6 +14,17 @@ pub struct Plan {
     /// Keep only a part of the states and compute the rest again on the way back: memory grows with the square root of
     /// the sequences' length, time by a third, and the bits stay the same.
     pub recompute: bool,
+    /// What to do when the training leaves its course.
+    pub on_divergence: OnDivergence,
+}
+
+/// What to do when a training leaves its course.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OnDivergence {
+    /// Go back to the last finite epoch and stop. A likelihood that collapses while all values stay finite is let pass.
+    Stop,
+    /// Go back to the best network, halve the rate, and go on; also when the likelihood collapses. After twenty times stop.
+    Recover,
 }
 
 impl Default for Plan {
@@ -23,6 +34,7 @@ impl Default for Plan {
             initial_state_variance: 1.0,
             optimiser: Optimiser::Momentum(Momentum::default()),
             recompute: false,
+            on_divergence: OnDivergence::Stop,
         }
     }
 }

@@ -173,3 +173,132 @@ fn settings_out_of_range_are_refused_by_name() {
     assert!(refuse(momentum(1, Momentum { momentum: 1.0, ..Momentum::default() })).contains("momentum.momentum is 1"));
     assert!(refuse(momentum(1, Momentum { rate: f64::NAN, ..Momentum::default() })).contains("momentum.rate is NaN"));
 }
+
+/// A plan that diverges, with a guard.
+fn guarded(epochs: u64, optimiser: Optimiser) -> Plan {
+    Plan { epochs, optimiser, on_divergence: OnDivergence::Recover, ..Plan::default() }
+}
+
+/// Counts what an observer is told.
+#[derive(Default)]
+struct Watch {
+    reports: Vec<EpochReport>,
+    recoveries: Vec<Recovery>,
+    stop_at: Option<u64>,
+}
+
+impl Observer for Watch {
+    fn epoch(&mut self, report: &EpochReport, _: &Learner) -> Control {
+        self.reports.push(report.clone());
+        if self.stop_at == Some(report.epoch) { Control::Stop } else { Control::Continue }
+    }
+
+    fn recovered(&mut self, recovery: &Recovery) {
+        self.recoveries.push(recovery.clone());
+    }
+}
+
+#[test]
+fn a_training_that_leaves_its_course_is_brought_back_and_ends_well() {
+    for optimiser in [
+        Optimiser::Momentum(Momentum { rate: 0.3, ..Momentum::default() }),
+        Optimiser::Momentum(Momentum { rate: 1e4, adaptive: None, ..Momentum::default() }),
+        Optimiser::Adam(Adam { rate: 3.0, clip_norm: 0.0, ..Adam::default() }),
+    ] {
+        let mut learner = learner(guarded(1500, optimiser.clone()), 1);
+        let mut watch = Watch::default();
+        assert_eq!(learner.run(&mut watch), Outcome::Finished, "{optimiser:?}");
+        let Watch { reports, recoveries, .. } = watch;
+        assert_eq!(reports.len(), 1501);
+        assert!(!recoveries.is_empty(), "{optimiser:?} needed no guard");
+        for (k, recovery) in recoveries.iter().enumerate() {
+            assert_eq!((recovery.number, recovery.rate_factor), (k as u64 + 1, 0.5_f64.powi(k as i32 + 1)));
+            // What the observer sees at that epoch is the best network again, and the rate from then on.
+            let at = recovery.divergence.epoch as usize;
+            let safe = recovery.divergence.rolled_back_to as usize;
+            assert_eq!(reports[at].ln_likelihood.to_bits(), reports[safe].ln_likelihood.to_bits());
+            assert_eq!(reports[at].recoveries, recovery.number);
+            assert!(recovery.divergence.to_string().contains("rolled back to epoch"));
+        }
+        let nll = |report: &EpochReport| report.nll.unwrap();
+        let best = reports.iter().map(nll).fold(f64::INFINITY, f64::min);
+        assert!(best < nll(&reports[0]) - 0.3, "{optimiser:?}: {} to {best}", nll(&reports[0]));
+        // No epoch that counts lies far above the best before it.
+        assert!(reports.iter().all(|report| nll(report).is_finite() && nll(report) < nll(&reports[0]) + 10.0));
+    }
+}
+
+#[test]
+fn a_guard_that_is_not_needed_changes_no_bit() {
+    for plan in [momentum(200, Momentum::default()), adam(200)] {
+        let [mut with, mut without] = [OnDivergence::Recover, OnDivergence::Stop]
+            .map(|on_divergence| learner(Plan { on_divergence, ..plan.clone() }, 1));
+        assert_eq!(run(&mut with), run(&mut without));
+        assert!(bits(&with) == bits(&without));
+    }
+}
+
+#[test]
+fn a_guarded_training_that_is_stopped_anywhere_goes_on_bit_for_bit() {
+    for optimiser in [
+        Optimiser::Momentum(Momentum { rate: 0.3, ..Momentum::default() }),
+        Optimiser::Adam(Adam { rate: 3.0, clip_norm: 0.0, ..Adam::default() }),
+    ] {
+        let plan = guarded(400, optimiser);
+        let mut whole = learner(plan.clone(), 1);
+        let mut watch = Watch::default();
+        whole.run(&mut watch);
+        let recovered = watch.recoveries[0].divergence.epoch;
+        for stop in [recovered - 1, recovered, recovered + 1, 390] {
+            let mut part = learner(plan.clone(), 1);
+            part.run(&mut Watch { stop_at: Some(stop), ..Watch::default() });
+            let (network, states) = (part.network().clone(), part.initial_states().clone());
+            let mut rest = Learner::new(network, states, &waves(3, 60), plan.clone(), &Engine::serial()).unwrap();
+            rest.restore(part.epoch(), &part.optimiser_state()).unwrap();
+            rest.run(&mut Watch::default());
+            assert!(bits(&whole) == bits(&rest), "stopped at {stop}");
+            assert_eq!(whole.optimiser_state(), rest.optimiser_state());
+        }
+    }
+}
+
+#[test]
+fn a_training_that_no_rate_can_save_stops_at_its_best_network() {
+    // Values without noise: the likelihood has no bound, and each recovery ends at the same cliff.
+    let still = Sequence::new("", 1, vec![0.25; 40]).unwrap();
+    let data = Dataset::new(vec!["y".into()], vec![still]).unwrap();
+    let topology = Topology::s_ctrnn(1, 4, 2.0).unwrap();
+    let (network, states) = initialize(&topology, 1, 5);
+    let plan = guarded(200_000, Optimiser::Momentum(Momentum { rate: 1e12, ..Momentum::default() }));
+    let mut learner = Learner::new(network, states, &data, plan, &Engine::serial()).unwrap();
+    let mut watch = Watch::default();
+    let Outcome::Diverged(divergence) = learner.run(&mut watch) else { panic!("it found a rate") };
+    assert_eq!((watch.recoveries.len(), divergence.rolled_back_to), (20, learner.epoch()));
+    assert!(bits(&learner).iter().all(|bits| f64::from_bits(*bits).is_finite()));
+}
+
+#[test]
+fn a_state_without_a_guard_is_taken_up_by_one_and_a_broken_one_is_refused() {
+    let plan = guarded(50, Optimiser::Momentum(Momentum::default()));
+    let mut old = learner(momentum(20, Momentum::default()), 1);
+    run(&mut old);
+    let take_up = |state: &crate::checkpoint::OptimiserState| {
+        let (network, states) = (old.network().clone(), old.initial_states().clone());
+        let mut new = Learner::new(network, states, &waves(3, 60), plan.clone(), &Engine::serial()).unwrap();
+        new.restore(20, state).map(|()| run(&mut new).0)
+    };
+    assert_eq!(take_up(&old.optimiser_state()), Ok(Outcome::Finished));
+    let whole = learner(plan.clone(), 1).optimiser_state();
+    assert_eq!(take_up(&whole), Ok(Outcome::Finished));
+    let guarded = |name: &str| name.starts_with("guard.") && name != "guard.recoveries";
+    for (index, tensor) in whole.tensors.iter().enumerate().filter(|(_, tensor)| guarded(&tensor.name)) {
+        let mut less = whole.clone();
+        less.tensors.remove(index);
+        assert!(take_up(&less).unwrap_err().to_string().contains("is missing"), "{}", tensor.name);
+    }
+    for (index, (name, _)) in whole.numbers.iter().enumerate().filter(|(_, (name, _))| guarded(name)) {
+        let mut less = whole.clone();
+        less.numbers.remove(index);
+        assert!(take_up(&less).unwrap_err().to_string().contains("is missing"), "{name}");
+    }
+}

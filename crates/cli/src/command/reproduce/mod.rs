@@ -1,7 +1,8 @@
-//! `scrnn reproduce`: an experiment of the thesis' chapter 3 from data to page.
+//! `scrnn reproduce`: an experiment of the thesis from data to page.
 
 mod curves;
 mod curves_page;
+mod interact;
 mod limit_cycle;
 mod metrics;
 mod overview;
@@ -37,7 +38,7 @@ use metrics::{METRICS, Machine, Metrics};
 use preset::{Kind, Preset};
 use study::{Learned, SeedResult, Study, Summary, TrainingFacts};
 
-/// Reproduce an experiment of the thesis' chapter 3, and write a page about it
+/// Reproduce an experiment of the thesis, and write a page about it
 ///
 /// Makes the data, trains, generates, recognises and evaluates. The folder receives report.html, one page that needs
 /// nothing else; metrics.json, all numbers; figures/, each figure as SVG with its numbers as CSV; and a run folder for
@@ -48,15 +49,17 @@ use study::{Learned, SeedResult, Study, Summary, TrainingFacts};
 Examples:
   scrnn reproduce sinusoid                               a page in a few seconds
   scrnn reproduce lissajous --seeds 5 --out runs/five    five networks side by side on the cores
-  scrnn reproduce limit-cycle --preset thesis            the thesis' optimiser and number of epochs")]
+  scrnn reproduce limit-cycle --preset thesis            the thesis' optimiser and number of epochs
+  scrnn reproduce interact --networks 10                 20 networks, in two robots' world and out of it")]
 pub struct Arguments {
     /// Which experiment
     experiment: Name,
     /// Which settings
     #[arg(long, value_enum, default_value_t = Preset::Fast)]
     preset: Preset,
-    /// Number of seeds, each with data and initial weights of its own
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    /// Number of seeds, each with data and initial weights of its own; of `interact` the number of networks a condition,
+    /// which all learn the same recordings
+    #[arg(long, visible_alias = "networks", value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
     /// The first seed
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -70,6 +73,9 @@ pub struct Arguments {
     /// A key of the S-CTRNN's training or network, e.g. --set training.adam.rate=1e-3
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<Override>,
+    /// With `interact`: also initial-state variances between the thesis' two, and branchings with a bias (5.4.3)
+    #[arg(long)]
+    beyond: bool,
     /// Train anew what is in the folder already
     #[arg(long)]
     overwrite: bool,
@@ -78,7 +84,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// The experiments of chapter 3.
+/// The thesis' experiments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Name {
     /// Twelve Lissajous curves, each with noise of its own (3.2)
@@ -91,6 +97,8 @@ enum Name {
     LimitCycle,
     /// NAO learns to touch a sphere from demonstrations, in simulation (4)
     Reach,
+    /// Two robots interact: reactive and proactive behaviour, and error regression (5)
+    Interact,
 }
 
 impl Name {
@@ -101,6 +109,7 @@ impl Name {
             Self::Sinusoid => "sinusoid",
             Self::LimitCycle => "limit-cycle",
             Self::Reach => "reach",
+            Self::Interact => "interact",
         }
     }
 }
@@ -122,6 +131,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         Name::Sinusoid => reproduce(&sinusoid::Sinusoid, arguments, shared),
         Name::LimitCycle => reproduce(&limit_cycle::LimitCycle, arguments, shared),
         Name::Reach => reproduce(&reach::REACH, arguments, shared),
+        Name::Interact => interact::run(arguments, shared),
     }
 }
 
@@ -251,6 +261,9 @@ fn command(arguments: &Arguments) -> String {
     line += &format!(" --seeds {} --seed {}", arguments.seeds, arguments.seed);
     if let Some(epochs) = arguments.epochs {
         line += &format!(" --epochs {epochs}");
+    }
+    if arguments.beyond {
+        line += " --beyond";
     }
     for change in &arguments.set {
         let key_and_value = change.typed.trim_start_matches("--set ");

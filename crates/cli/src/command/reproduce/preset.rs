@@ -64,6 +64,18 @@ pub const REACH_EXACT: Kind = Kind {
     suffix: "-exact",
     presets: [asset!("reaching_exact.toml"), asset!("reaching_exact_fast.toml")],
 };
+/// The S-MTRNN with initial states held together.
+pub const INTERACTION_NARROW: Kind = Kind {
+    name: "S-MTRNN",
+    suffix: "",
+    presets: [asset!("interaction_narrow.toml"), asset!("interaction_narrow_fast.toml")],
+};
+/// The S-MTRNN whose sequences have initial states of their own.
+pub const INTERACTION_WIDE: Kind = Kind {
+    name: "S-MTRNN",
+    suffix: "",
+    presets: [asset!("interaction_wide.toml"), asset!("interaction_wide_fast.toml")],
+};
 
 impl Kind {
     /// The resolved experiment with some of its keys changed. `seed` is that of the weights and of the data's noise alike.

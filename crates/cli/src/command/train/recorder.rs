@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use scrnn::checkpoint::{Checkpoint, OptimiserState};
 use scrnn::initial_states::InitialStates;
-use scrnn::learning::{Control, EpochReport, Learner, Observer, Outcome};
+use scrnn::learning::{Control, EpochReport, Learner, Observer, Outcome, Recovery};
 use scrnn::parameters::Parameters;
 use scrnn::scaling::Scaling;
 
@@ -49,6 +49,8 @@ pub struct Recorder<'a> {
     /// The best network so far, if it is known, and whether its file is yet to be written.
     best: Option<(Parameters, InitialStates)>,
     best_waits: bool,
+    /// Whether the training was just brought back: that is worth a row of the history.
+    recovered: bool,
     failure: Option<Failure>,
 }
 
@@ -80,6 +82,7 @@ impl<'a> Recorder<'a> {
             saved_epoch: None,
             best: None,
             best_waits: false,
+            recovered: false,
             failure: None,
         }
     }
@@ -124,6 +127,13 @@ impl<'a> Recorder<'a> {
     pub fn finish(&mut self, learner: &Learner, outcome: &Outcome) -> Result<()> {
         self.progress.finish();
         if let Some(failure) = self.failure.take() {
+            if let Some(epoch) = self.saved_epoch {
+                let folder = self.run.path().display();
+                eprintln!(
+                    "epoch {epoch} is the last that is saved in {folder}. Once what follows is put right, go on from there:\n  \
+                     scrnn train {folder} --resume"
+                );
+            }
             return Err(failure);
         }
         if matches!(outcome, Outcome::Diverged(_)) || self.saved_epoch != Some(learner.epoch()) {
@@ -201,7 +211,8 @@ impl Observer for Recorder<'_> {
         self.notes.score = Some(score);
         self.compare(score, learner);
         let last = report.epoch >= self.epochs;
-        if last || report.epoch.is_multiple_of(self.history_every) {
+        let recovered = std::mem::take(&mut self.recovered);
+        if last || recovered || report.epoch.is_multiple_of(self.history_every) {
             self.history.row(report, self.begun.elapsed().as_secs_f64());
         }
         self.progress.epoch(report);
@@ -213,5 +224,13 @@ impl Observer for Recorder<'_> {
             return Control::Stop;
         }
         if stop { Control::Stop } else { Control::Continue }
+    }
+
+    fn recovered(&mut self, recovery: &Recovery) {
+        self.recovered = true;
+        let Recovery { divergence, number, rate_factor } = recovery;
+        self.progress.say(&format!(
+            "{divergence}, the best one; going on from there at {rate_factor} of the rate (recovery {number})"
+        ));
     }
 }

@@ -21,6 +21,8 @@ pub fn check(checkpoint: &Checkpoint, now: Notes, experiment: &Experiment, path:
     let mut changes = differences(&then.experiment, &now.experiment);
     // Samples are compared, not where they lie.
     changes.retain(|change| change.key != "data.files");
+    // A run of a version that did not bring trainings back comes to the same as long as it did not need to.
+    changes.retain(|change| change.key != "training.on_divergence" || change.old.is_some());
     let by_momentum = experiment.training.optimiser == OptimiserName::Momentum;
     let is_epochs = |change: &Difference| change.key == "training.epochs";
     if by_momentum && experiment.training.epochs >= checkpoint.epoch {

@@ -9,6 +9,7 @@ use scrnn::initialization::initialize;
 use scrnn::learning::{Learner, Outcome};
 use scrnn::network::Network;
 use scrnn::scaling::Scaling;
+use scrnn::topology::Topology;
 
 use super::interrupt::Interrupt;
 use super::recorder::{Record, Recorder};
@@ -69,6 +70,7 @@ pub fn train(
     let source = source::load(&experiment.data)?;
     let topology = experiment.topology(source.data.channels().len())?;
     source.data.check_for(&topology)?;
+    refuse_unbounded(&source.data, &topology)?;
     let scaling = experiment.data.scaling_for(&source.data)?;
     let scaled = scaling.apply(&source.data);
     warn_out_of_reach(&scaled, shared);
@@ -126,6 +128,38 @@ pub fn train(
     let (score, best, seconds) = (recorder.score_of(learner.epoch()), recorder.best(), recorder.seconds());
     let run = run.path().display().to_string();
     Ok(Training { run, outcome, learner, source, scaling, score, best, seconds })
+}
+
+/// Channels whose predicted samples are all the same.
+pub fn still_channels(data: &Dataset, delay: usize) -> Vec<String> {
+    let n = data.channels().len();
+    let predicted = || data.sequences().iter().filter_map(|sequence| sequence.values().get(delay * n..));
+    let still = |i: usize| {
+        let mut samples = predicted().flat_map(|values| values.chunks_exact(n)).map(|sample| sample[i]);
+        let first = samples.next();
+        samples.all(|sample| Some(sample) == first)
+    };
+    // One sample says nothing about change.
+    let several = predicted().map(|values| values.len() / n).sum::<usize>() > 1;
+    (0..n).filter(|&i| several && still(i)).map(|i| data.channels()[i].clone()).collect()
+}
+
+/// A channel that never changes lets its variance fall for ever: refuses it where no floor stops that.
+fn refuse_unbounded(data: &Dataset, topology: &Topology) -> Result<()> {
+    if !topology.has_variance() || topology.variance_floor() > 0.0 {
+        return Ok(());
+    }
+    let still = still_channels(data, topology.delay());
+    let Some(first) = still.first() else { return Ok(()) };
+    let what = if still.len() == 1 {
+        format!("channel {first} never changes")
+    } else {
+        format!("channels {} never change", still.join(", "))
+    };
+    Err(Failure::input(
+        format!("{what}: without noise its likelihood has no bound, and its variance would fall until numbers end"),
+        "leave it out with `channels` in [data], or set `variance_floor` in [network], e.g. to 1e-4",
+    ))
 }
 
 /// A learner that stands where the checkpoint stands.

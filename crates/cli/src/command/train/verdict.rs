@@ -8,7 +8,7 @@ use scrnn::evaluation::gaussian_entropy;
 use scrnn::learning::{Divergence, Outcome};
 use serde::Serialize;
 
-use super::training::Training;
+use super::training::{Training, still_channels};
 use crate::failure::Result;
 use crate::notes::Score;
 use crate::truth::{self, Comparison};
@@ -26,6 +26,10 @@ pub struct Verdict {
     best: Option<Score>,
     truth: Option<Comparison>,
     divergence: Option<Place>,
+    /// Channels that never change in the samples that are predicted, where the variance is predicted.
+    still_channels: Vec<String>,
+    /// How often the training was brought back to its best network, at half the rate.
+    recoveries: u64,
     seconds: f64,
     threads: usize,
     instruction_set: String,
@@ -78,6 +82,11 @@ impl Verdict {
                 Outcome::Diverged(divergence) => Some(Place::of(divergence)),
                 _ => None,
             },
+            still_channels: match topology.has_variance() {
+                true => still_channels(&source.data, topology.delay()),
+                false => Vec::new(),
+            },
+            recoveries: learner.recoveries(),
             seconds: *seconds,
             threads: engine.threads(),
             instruction_set: engine.instruction_set().to_string(),
@@ -138,6 +147,17 @@ impl fmt::Display for Verdict {
                     )?;
                 }
             }
+        }
+        if self.recoveries > 0 {
+            writeln!(
+                f,
+                "Training left its course {} times and was brought back each time to its best network, at half the rate: \
+                 the rate is too large for these data (history.csv has the epochs).",
+                self.recoveries
+            )?;
+        }
+        for channel in &self.still_channels {
+            writeln!(f, "Channel {channel} never changes: its predicted variance comes down to the variance_floor.")?;
         }
         match &self.truth {
             Some(truth) => writeln!(f, "{truth}"),

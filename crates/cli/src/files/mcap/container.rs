@@ -59,7 +59,13 @@ pub fn messages(
     bytes: &[u8],
     mut each: impl FnMut(Message<'_>) -> Result<(), RecordingProblem>,
 ) -> Result<(), RecordingProblem> {
-    let mut rest = Bytes(bytes.strip_prefix(MAGIC).ok_or(RecordingProblem::NotMcap)?);
+    let mut rest = match bytes {
+        [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n', rest @ ..] => Bytes(rest),
+        [0x89, b'M', b'C', b'A', b'P', version, b'\r', b'\n', ..] => {
+            return Err(RecordingProblem::Version { found: (*version as char).escape_default().to_string() });
+        }
+        _ => return Err(RecordingProblem::NotMcap),
+    };
     let mut reader = Reader { schemas: BTreeMap::new(), channels: BTreeMap::new(), count: 0 };
     let mut unpacked = 0;
     loop {

@@ -215,6 +215,7 @@ fn a_recording_that_is_cut_or_damaged_anywhere_is_refused_or_read_but_never_pani
     }
     assert_eq!(said(&bytes[..300], &Selection::default()).0, "r.mcap: the recording is cut off");
     assert_eq!(said(b"y1,y2\n", &Selection::default()).0, "r.mcap: this is not an MCAP file");
+    assert_eq!(said(b"\x89MCAP1\r\n", &Selection::default()).0, "r.mcap: version 1 of MCAP; known: 0");
     let expected = values(&bytes, &Selection::default());
     for at in 0..bytes.len() {
         for bit in 0..8 {

@@ -1,0 +1,21 @@
+#!/bin/sh
+# Makes the corpora that fuzzing starts from, with the program itself and the files that are kept in the repository:
+#   fuzz/seeds.sh target/release/scrnn
+# Then e.g. `cargo +nightly fuzz run -s none table -- -runs=1000000 -max_len=4096`.
+set -eu
+scrnn=$(realpath "${1:-target/release/scrnn}")
+cd "$(dirname "$0")"
+for target in table npy npz mcap experiment checkpoint urdf; do mkdir -p "corpus/$target"; done
+for kind in csv tsv txt; do "$scrnn" data lissajous --sequences 2 --steps 4 --out "corpus/table/x.$kind" -q; done
+rm -f corpus/*/*.truth.*
+printf 'sequence;step;y 1;"y ""2"""\na;1;0,5;2\na;2;1;3\n\nb;1;nan;-1e9\n' > corpus/table/semicolons
+printf '# columns: a b\n# sequence: x\n1 2\n3 4\n\n# sequence: y\n5 inf\n' > corpus/table/comments
+"$scrnn" data lissajous --sequences 2 --steps 4 --out corpus/npy/x.npy -q
+"$scrnn" data lissajous --sequences 2 --steps 4 --out corpus/npz/x.npz -q
+rm -f corpus/*/*.truth.*
+cp ../assets/experiments/*.toml corpus/experiment/
+cp ../tests/golden/run/*.safetensors corpus/checkpoint/
+cp ../tests/golden/run/experiment.toml corpus/experiment/
+cp corpora/*.mcap corpus/mcap/
+[ ! -e ../assets/nao/nao.urdf ] || cp ../assets/nao/nao.urdf corpus/urdf/
+printf '<robot name="a"><link name="b"/><link name="c"/><joint name="d" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>' > corpus/urdf/small
