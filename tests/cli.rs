@@ -6,6 +6,8 @@ mod experiments;
 mod extremes;
 #[path = "cli/following.rs"]
 mod following;
+#[path = "cli/reaching.rs"]
+mod reaching;
 #[path = "cli/recordings.rs"]
 mod recordings;
 #[path = "cli/refusals.rs"]

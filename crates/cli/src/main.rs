@@ -10,6 +10,7 @@ mod history;
 mod interactions;
 mod notes;
 mod output;
+mod processor_time;
 mod progress;
 mod report;
 mod run_folder;

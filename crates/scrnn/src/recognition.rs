@@ -26,7 +26,8 @@ pub enum WarmStart {
     Mean,
     /// The learned initial states, the one that explains the sequence best first.
     Learned,
-    /// Drawn from the normal distribution with the learned states' mean and variance in each unit.
+    /// Drawn from the normal distribution with the learned states' mean and, unless
+    /// [`RecognitionOptions::random_spread`] says otherwise, their variance in each unit.
     Random,
 }
 
@@ -39,10 +40,15 @@ pub struct RecognitionOptions {
     pub epochs: u64,
     /// Seed of the random starts.
     pub seed: u64,
+    /// Standard deviation of the random starts in each unit, as a share of that of the learned states.
+    pub random_spread: f64,
     /// Use the first so many samples only.
     pub observed: Option<usize>,
     /// The largest rate; it falls on a cosine.
     pub rate: f64,
+    /// Decay of Adam's second moment. On the way from a wrong attractor to the right one the likelihood's slope falls by
+    /// orders of magnitude: who remembers the first squares for long takes steps that are too small for all the rest.
+    pub beta2: f64,
     /// sigma^2_IS of the prior around the learned mean.
     pub initial_state_variance: f64,
     /// Kinds of starts, taken in turn; zero and mean once, learned as often as there are sequences.
@@ -55,8 +61,10 @@ impl Default for RecognitionOptions {
             starts: 20,
             epochs: 300,
             seed: 1,
+            random_spread: 1.0,
             observed: None,
             rate: 0.1,
+            beta2: 0.999,
             initial_state_variance: 1.0,
             warm_starts: vec![WarmStart::Zero, WarmStart::Mean, WarmStart::Learned, WarmStart::Random],
         }
@@ -164,7 +172,7 @@ pub fn recognize(
         let mut random = ChaCha8Rng::seed_from_u64(options.seed);
         random.set_stream(s as u64);
         for start in starts(options, ranking) {
-            states.extend(initial_state(network, learned, start, &mut random));
+            states.extend(initial_state(network, learned, start, options.random_spread, &mut random));
             origins.push((s, start));
         }
     }
@@ -203,7 +211,8 @@ fn check(network: &Network, data: &Dataset, options: &RecognitionOptions) -> Res
     if options.warm_starts.is_empty() {
         return setting("the list of starts", "empty".to_owned(), "at least one kind");
     }
-    for (what, value) in [("rate", options.rate), ("initial_state_variance", options.initial_state_variance)] {
+    let spread = ("random_spread", options.random_spread);
+    for (what, value) in [("rate", options.rate), ("initial_state_variance", options.initial_state_variance), spread] {
         if !(value > 0.0 && value.is_finite()) {
             return setting(what, value.to_string(), "a positive number");
         }
@@ -236,7 +245,13 @@ fn starts(options: &RecognitionOptions, ranking: &[Ranked]) -> Vec<TrialStart> {
     starts
 }
 
-fn initial_state(network: &Network, learned: &InitialStates, start: TrialStart, random: &mut ChaCha8Rng) -> Vec<f64> {
+fn initial_state(
+    network: &Network,
+    learned: &InitialStates,
+    start: TrialStart,
+    spread: f64,
+    random: &mut ChaCha8Rng,
+) -> Vec<f64> {
     let learns: Vec<bool> = network.topology.per_unit(|group| group.learns_initial_state).collect();
     let n = learned.sequences().max(1) as f64;
     let of = |i: usize| (0..learned.sequences()).map(move |s| learned.sequence(s)[i]);
@@ -245,7 +260,7 @@ fn initial_state(network: &Network, learned: &InitialStates, start: TrialStart, 
         let variance = of(i).map(|u| (u - mean).powi(2)).sum::<f64>() / n;
         // Even where nothing was learned, starts must differ.
         let z: f64 = StandardNormal.sample(random);
-        mean + variance.sqrt().max(1e-3) * z
+        mean + (spread * variance.sqrt()).max(1e-3) * z
     };
     (0..learns.len())
         .map(|i| match start {
@@ -274,7 +289,7 @@ fn ascend(
     options: &RecognitionOptions,
     network: &Network,
 ) -> Best {
-    const BETA: (f64, f64) = (0.9, 0.999);
+    let beta = (0.9, options.beta2);
     let n_c = mean.len();
     let learns: Vec<bool> = network.topology.per_unit(|group| group.learns_initial_state).collect();
     let variance = options.initial_state_variance;
@@ -291,7 +306,7 @@ fn ascend(
         let phase = std::f64::consts::PI * epoch as f64 / options.epochs.max(1) as f64;
         let rate = options.rate * 0.5 * (1.0 + phase.cos());
         let correct = |beta: f64| 1.0 / (1.0 - beta.powf(epoch as f64 + 1.0));
-        let (correct_first, correct_second) = (correct(BETA.0), correct(BETA.1));
+        let (correct_first, correct_second) = (correct(beta.0), correct(beta.1));
         for (index, scale) in scales.iter().enumerate() {
             let own = index * n_c..(index + 1) * n_c;
             let ln_likelihood = objective.ln_likelihood[index];
@@ -314,8 +329,8 @@ fn ascend(
                 }
                 let pull = (states[at] - mean[i]) / variance;
                 let g = s * (objective.initial[at] - pull) / scale;
-                first[at] = BETA.0 * first[at] + (1.0 - BETA.0) * g;
-                second[at] = BETA.1 * second[at] + (1.0 - BETA.1) * g * g;
+                first[at] = beta.0 * first[at] + (1.0 - beta.0) * g;
+                second[at] = beta.1 * second[at] + (1.0 - beta.1) * g * g;
                 let step = first[at] * correct_first / ((second[at] * correct_second).sqrt() + 1e-8);
                 states[at] += s * rate * step;
             }
@@ -410,6 +425,22 @@ mod tests {
     }
 
     #[test]
+    fn random_starts_lie_as_far_apart_as_asked() {
+        let (network, states, data) = setting();
+        let distance = |random_spread: f64| -> f64 {
+            let warm_starts = vec![WarmStart::Random];
+            let drawn = RecognitionOptions { starts: 40, epochs: 0, random_spread, warm_starts, ..options() };
+            let results = recognize(&network, &states, &data, &drawn, &Engine::serial()).unwrap();
+            let average = |i: usize| (0..3).map(|s| states.sequence(s)[i]).sum::<f64>() / 3.0;
+            let off = |(i, u): (usize, &f64)| (u - average(i)).powi(2);
+            let trials = results.iter().flat_map(|result| &result.trials);
+            trials.map(|trial| trial.initial_state.iter().enumerate().map(off).sum::<f64>()).sum::<f64>().sqrt()
+        };
+        // The same draws, each at a quarter of its distance.
+        assert!((distance(0.25) / distance(1.0) - 0.25).abs() < 1e-12);
+    }
+
+    #[test]
     fn senseless_requests_are_refused() {
         let (network, states, data) = setting();
         let refuse = |options: RecognitionOptions| {
@@ -417,5 +448,7 @@ mod tests {
         };
         assert!(refuse(RecognitionOptions { observed: Some(1), ..options() }).contains("more samples than the delay"));
         assert!(refuse(RecognitionOptions { starts: 0, ..options() }).contains("starts is 0"));
+        assert!(refuse(RecognitionOptions { random_spread: 0.0, ..options() }).contains("random_spread is 0"));
+        assert!(refuse(RecognitionOptions { beta2: 1.0, ..options() }).contains("beta2 is 1"));
     }
 }

@@ -25,3 +25,5 @@ pub mod tutor;
 pub mod world;
 
 mod articulation;
+#[cfg(test)]
+mod description_tests;

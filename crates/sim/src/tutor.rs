@@ -12,6 +12,7 @@ use scrnn::dataset::{Dataset, Sequence};
 
 use crate::channels::REACHING;
 use crate::error::{Error, Result};
+use crate::joints::RIGHT_ARM;
 use crate::nao;
 use crate::parallel::in_parallel;
 use crate::reaching::{CYCLE, CYCLES, PERIOD, POSITIONS, RETRACTION, Stage, samples_to_steps, touching_arm};
@@ -57,8 +58,8 @@ const LEAN: f64 = 0.01;
 const FREEDOM: [f64; 4] = [0.15, 0.15, 0.25, 0.15];
 /// The wander's memory over a sample and its deviation, in rad.
 const MEMORY: f64 = 0.6;
-const WANDER: f64 = 0.05;
-/// Within this time of a touch there is no wander; after twice the time there is all of it, in seconds.
+const WANDER: f64 = 0.07;
+/// Within this time of a touch there is no wander; from there it grows, and half a cycle away there is all of it, in seconds.
 const CALM: f64 = 0.5;
 /// Noise of the arm's sensors, and of the head's together with what its gaze control does, in rad.
 const ARM_NOISE: f64 = 0.002;
@@ -175,6 +176,8 @@ struct Path {
     touches: Vec<f64>,
     /// The wander at each sample.
     wander: Vec<[f64; 4]>,
+    /// Smallest and largest angles.
+    limits: [[f64; 2]; 4],
 }
 
 impl Path {
@@ -201,7 +204,12 @@ impl Path {
             let before = wander[wander.len() - 1];
             wander.push(before.map(|w| MEMORY * w + innovation * normal(random)));
         }
-        Ok(Self { keys, touches, wander })
+        let arm = robot.joints_named(&RIGHT_ARM)?;
+        let limits = std::array::from_fn(|joint| {
+            let limits = robot.limits(arm[joint]);
+            [limits.lower, limits.upper]
+        });
+        Ok(Self { keys, touches, wander, limits })
     }
 
     /// The arm at a time, in seconds.
@@ -214,10 +222,11 @@ impl Path {
         let sample = (time / PERIOD).clamp(0.0, (self.wander.len() - 1) as f64);
         let (index, part) = ((sample as usize).min(self.wander.len() - 2), sample.fract());
         let nearest = self.touches.iter().map(|touch| (touch - time).abs()).fold(f64::INFINITY, f64::min);
-        let free = ((nearest - CALM) / CALM).clamp(0.0, 1.0);
+        let free = ((nearest - CALM) / (CYCLE as f64 * PERIOD / 2.0 - CALM)).clamp(0.0, 1.0);
         std::array::from_fn(|joint| {
             let wander = (1.0 - part) * self.wander[index][joint] + part * self.wander[index + 1][joint];
-            start[joint] + done * (goal[joint] - start[joint]) + free * wander
+            let angle = start[joint] + done * (goal[joint] - start[joint]) + free * wander;
+            angle.clamp(self.limits[joint][0], self.limits[joint][1])
         })
     }
 }

@@ -26,11 +26,13 @@ pub struct WorldOptions {
     pub step: f64,
     /// Downwards, in m/s^2.
     pub gravity: f64,
+    /// Parts into which the solver cuts a step.
+    pub substeps: usize,
 }
 
 impl Default for WorldOptions {
     fn default() -> Self {
-        Self { step: 0.005, gravity: 9.81 }
+        Self { step: 0.005, gravity: 9.81, substeps: 4 }
     }
 }
 
@@ -149,6 +151,7 @@ impl World {
         let mut physics =
             PhysicsWorld { gravity: to_vector(&Vector3::new(0.0, 0.0, -options.gravity)), ..PhysicsWorld::default() };
         physics.integration_parameters.dt = options.step;
+        physics.integration_parameters.num_solver_iterations = options.substeps.max(1);
         // Its tolerance of 5 cm is a robot's hand here.
         physics.integration_parameters.contact_recycling = false;
         let (inhabitants, bodies, by_name) = (Vec::new(), Vec::new(), BTreeMap::new());

@@ -8,6 +8,8 @@ mod conversion;
 mod difference;
 mod overrides;
 mod reading;
+#[cfg(test)]
+mod reading_tests;
 
 use std::path::PathBuf;
 

@@ -198,4 +198,6 @@ fn collect(path: &str, channels: Vec<String>, sequences: Vec<(String, Vec<f64>)>
 }
 
 #[cfg(test)]
+mod memory_tests;
+#[cfg(test)]
 mod tests;

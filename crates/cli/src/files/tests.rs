@@ -110,7 +110,7 @@ fn arrays_become_sequences_by_their_axes() {
 }
 
 /// An archive of these members, deflated as numpy.savez_compressed does.
-fn archive(members: &[(&str, Vec<u8>)]) -> Vec<u8> {
+pub fn archive(members: &[(&str, Vec<u8>)]) -> Vec<u8> {
     use std::io::Write;
     let mut archive = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
     for (name, bytes) in members {

@@ -130,7 +130,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         Name::Patterns => reproduce(&curves::PATTERNS, arguments, shared),
         Name::Sinusoid => reproduce(&sinusoid::Sinusoid, arguments, shared),
         Name::LimitCycle => reproduce(&limit_cycle::LimitCycle, arguments, shared),
-        Name::Reach => reproduce(&reach::Reach, arguments, shared),
+        Name::Reach => reproduce(&reach::REACH, arguments, shared),
         Name::Interact => interact::run(arguments, shared),
     }
 }

@@ -23,10 +23,6 @@ use crate::report::Section;
 /// Half way between neighbouring positions.
 const BETWEEN: [f64; 2] = [-0.105, -0.035];
 
-/// Cycles of a performance with noise, and of the others.
-const CYCLES: usize = 30;
-const FEWER: usize = 10;
-
 /// Shifts of the sphere, from where to where, one each at another moment of the cycle.
 const SHIFTS: [(usize, usize); 6] = [(0, 1), (0, 2), (1, 2), (1, 0), (2, 1), (2, 0)];
 /// Sample of the first shift: a hand that keeps time is far from the sphere then.
@@ -37,7 +33,17 @@ const NOISE: u64 = 1000;
 
 /// The experiment.
 #[derive(Debug)]
-pub struct Reach;
+pub struct Reach {
+    /// Cycles of a performance with noise.
+    cycles: usize,
+    /// Cycles of the others.
+    fewer: usize,
+    /// Cycles after the sphere was put elsewhere.
+    after_shift: usize,
+}
+
+/// At its full length.
+pub const REACH: Reach = Reach { cycles: 30, fewer: 10, after_shift: 15 };
 
 /// The figures of one seed.
 #[derive(Debug, Serialize)]
@@ -50,7 +56,7 @@ pub struct Findings {
     pub shifts: Vec<Shifted>,
     /// Variance over the cycle.
     pub variance: ByPhase,
-    /// How many times faster than real time the closed loop ran, on one thread: the median of all performances.
+    /// How many times faster than real time the closed loop ran on one processor: the median of all performances.
     pub speed: f64,
 }
 
@@ -137,17 +143,18 @@ struct Plan {
 }
 
 /// All drivers. `constant` is the variance of the noise that does not change.
-fn plans(places: &[f64], constant: Vec<f64>, frozen: [f64; 2]) -> Vec<Plan> {
+fn plans(study: &Reach, places: &[f64], constant: Vec<f64>, frozen: [f64; 2]) -> Vec<Plan> {
+    let &Reach { cycles, fewer, .. } = study;
     let learned_and_between = places[..POSITIONS.len() + BETWEEN.len()].to_vec();
     let plan = |key, label, who, cycles| Plan { key, label, who, cycles, places: places.to_vec(), frozen: None };
     let network = |noise| Who::Network { index: 0, noise };
     vec![
-        plan("noise", "S-CTRNN, predicted noise", network(Noise::Predicted), CYCLES),
-        plan("no_noise", "S-CTRNN, no noise", network(Noise::Off), FEWER),
-        plan("constant_noise", "S-CTRNN, noise of constant variance", network(Noise::Constant(constant)), FEWER),
+        plan("noise", "S-CTRNN, predicted noise", network(Noise::Predicted), cycles),
+        plan("no_noise", "S-CTRNN, no noise", network(Noise::Off), fewer),
+        plan("constant_noise", "S-CTRNN, noise of constant variance", network(Noise::Constant(constant)), fewer),
         Plan {
             frozen: Some(frozen),
-            ..plan("frozen", "S-CTRNN, head frozen at position 2", network(Noise::Predicted), FEWER)
+            ..plan("frozen", "S-CTRNN, head frozen at position 2", network(Noise::Predicted), fewer)
         },
         Plan {
             places: learned_and_between,
@@ -155,12 +162,12 @@ fn plans(places: &[f64], constant: Vec<f64>, frozen: [f64; 2]) -> Vec<Plan> {
                 "exact",
                 "S-CTRNN that learned three exact positions",
                 Who::Network { index: 1, noise: Noise::Predicted },
-                FEWER,
+                fewer,
             )
         },
-        plan("replay", "replay of the nearest mean demonstration", Who::Replay, FEWER),
-        plan("mixture", "GMM/GMR, mean", Who::Mixture { noise: false }, FEWER),
-        plan("mixture_noise", "GMM/GMR, noise of its covariance", Who::Mixture { noise: true }, FEWER),
+        plan("replay", "replay of the nearest mean demonstration", Who::Replay, fewer),
+        plan("mixture", "GMM/GMR, mean", Who::Mixture { noise: false }, fewer),
+        plan("mixture_noise", "GMM/GMR, noise of its covariance", Who::Mixture { noise: true }, fewer),
     ]
 }
 
@@ -189,7 +196,7 @@ impl Study for Reach {
         let mut places = [&POSITIONS[..], &BETWEEN].concat();
         places.extend(places_between(seed, 4));
         let frozen = gaze_at(&nao::load_one_armed()?, POSITIONS[1])?;
-        let plans = plans(&places, constant, frozen);
+        let plans = plans(self, &places, constant, frozen);
         let mut trials = Vec::new();
         for plan in &plans {
             for (place, &y) in plan.places.iter().enumerate() {
@@ -207,7 +214,8 @@ impl Study for Reach {
         for (k, &(from, to)) in SHIFTS.iter().enumerate() {
             let at = FIRST_SHIFT + 2 * k;
             let shift = Some((at, POSITIONS[to]));
-            let performance = Performance { shift, samples: at + samples(15), ..still(POSITIONS[from], 0) };
+            let performance =
+                Performance { shift, samples: at + samples(self.after_shift), ..still(POSITIONS[from], 0) };
             let who = Who::Network { index: 0, noise: Noise::Predicted };
             trials.push(Trial { who, performance, seed: seed + NOISE * (100 + k as u64), pictures: false });
         }
@@ -363,9 +371,14 @@ impl Study for Reach {
             measure("touched_mixture_noise", "Instead: GMM/GMR with its noise", "touches per cycle", "", 3, |f| {
                 f.rate("mixture_noise")
             }),
-            measure("speed", "Closed loop, times real time", "median of all performances, on one thread", "", 0, |f| {
-                Some(f.speed)
-            }),
+            measure(
+                "speed",
+                "Closed loop, times real time",
+                "median of all performances, by the time that one processor spends on it",
+                "",
+                0,
+                |f| Some(f.speed),
+            ),
         ]
     }
 
@@ -472,4 +485,68 @@ fn verdicts(seeds: &[SeedResult<Findings>]) -> Vec<Verdict> {
 /// The channel that a name of the thesis' figures stands for.
 pub fn channel(name: &str) -> usize {
     REACHING.iter().position(|channel| *channel == name).unwrap_or(VISION)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::command::reproduce::preset::Preset;
+    use crate::command::reproduce::study::TrainingFacts;
+    use crate::report::Page;
+    use crate::source;
+    use scrnn::initialization::initialize;
+
+    /// Networks that have learned nothing, beside three short demonstrations.
+    fn networks() -> Vec<Learned> {
+        let learned = |kind: &Kind| {
+            let mut experiment = kind.experiment(Preset::Fast, 2, Some(1), &[]).unwrap();
+            (experiment.data.sequences, experiment.data.steps) = (Some(3), Some(36));
+            let source = source::load(&experiment.data).unwrap();
+            let (network, initial_states) = initialize(&experiment.topology(6).unwrap(), 3, 2);
+            let training = TrainingFacts {
+                network: kind.name,
+                folder: String::new(),
+                epochs: 0,
+                nll: None,
+                mse: None,
+                seconds: 0.0,
+                diverged: None,
+            };
+            Learned { name: kind.name, experiment, network, initial_states, source, history: Vec::new(), training }
+        };
+        REACH.networks().iter().map(learned).collect()
+    }
+
+    #[test]
+    fn a_short_reproduction_judges_every_driver_and_the_same_seed_comes_to_the_same() {
+        let study = Reach { cycles: 6, fewer: 1, after_shift: 1 };
+        let networks = networks();
+        let evaluate = |threads| {
+            let engine = Engine::new(threads, scrnn::engine::InstructionSet::best()).unwrap();
+            let (mut findings, material) = study.evaluate(&networks, 2, &engine).unwrap();
+            findings.speed = 0.0;
+            (serde_json::to_value(&findings).unwrap(), findings, material)
+        };
+        let (first, findings, material) = evaluate(2);
+        assert_eq!(first, evaluate(1).0);
+        let keys: Vec<&str> = findings.conditions.iter().map(|condition| condition.key).collect();
+        let expected = ["noise", "no_noise", "constant_noise", "frozen", "exact", "replay", "mixture", "mixture_noise"];
+        assert_eq!(keys, expected);
+        assert_eq!((findings.conditions[0].places.len(), findings.conditions[4].places.len()), (9, 5));
+        // A tutor touches, an untrained network does not, and a replayed demonstration does where it was given.
+        assert!(findings.demonstrations.iter().all(|one| one.rate() == 1.0));
+        assert!(findings.rate("noise").unwrap() < 0.5);
+        assert!(findings.condition("replay").unwrap().learned().iter().any(|found| found.touched > 0));
+        assert_eq!((findings.shifts.len(), findings.variance.phase.len()), (6, 12));
+
+        let seed = SeedResult { seed: 2, seconds: 1.0, threads: 1, trainings: Vec::new(), findings };
+        let page = Page { title: "t".into(), lede: String::new(), sections: study.sections(&seed, &material) };
+        let files: Vec<&str> = page.figures().map(|figure| figure.file.as_str()).collect();
+        assert_eq!(files, ["over-time", "snapshots", "phase-plots", "variance-by-phase"]);
+        assert!(!page.html().contains("NaN"));
+        let verdicts = study.verdicts(&[seed]);
+        assert_eq!(verdicts.len(), 17);
+        let met = |goal: &str| verdicts.iter().find(|verdict| verdict.goal.starts_with(goal)).unwrap().met;
+        assert!(!met("touches per cycle, no noise") && !met("touches per cycle, pooled") && met("time of a seed"));
+    }
 }

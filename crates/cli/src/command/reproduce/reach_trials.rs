@@ -1,7 +1,5 @@
 //! Performances of the reaching experiment: who drives the arm, where the sphere lies, what came of it.
 
-use std::time::Instant;
-
 use scrnn::analysis::mixture::{GaussianMixture, MixtureOptions};
 use scrnn::engine::InstructionSet;
 use scrnn_sim::agent::{
@@ -18,6 +16,7 @@ use serde::Serialize;
 
 use super::study::Learned;
 use crate::failure::{Failure, Result};
+use crate::processor_time::ProcessorTime;
 
 /// Components of the mixture: with 41 of them it has as many numbers as the network, about 1480.
 pub const COMPONENTS: usize = 41;
@@ -61,7 +60,7 @@ pub struct Given {
     pub performed: Performed,
     /// Pictures with their times, ten in a second; empty unless asked for.
     pub pictures: Vec<(f64, Scene)>,
-    /// How many times faster than real time it was.
+    /// How many times faster than real time it was, by the processor's time.
     pub speed: f64,
 }
 
@@ -125,7 +124,7 @@ impl<'a> Company<'a> {
     fn give(&self, trial: &Trial) -> Result<Given> {
         let mut driver = self.driver(trial)?;
         let mut pictures = Vec::new();
-        let clock = Instant::now();
+        let clock = ProcessorTime::start();
         let mut look = |glimpse: &Glimpse<'_>| -> Result<()> {
             let time = glimpse.stage.world.time();
             if trial.pictures && glimpse.decision.is_none() && time + 1e-9 > 0.1 * (pictures.len() + 1) as f64 {
@@ -134,7 +133,7 @@ impl<'a> Company<'a> {
             Ok(())
         };
         let performed = perform(&trial.performance, driver.as_mut(), &mut look)?;
-        let speed = trial.performance.samples as f64 * PERIOD / clock.elapsed().as_secs_f64();
+        let speed = trial.performance.samples as f64 * PERIOD / clock.seconds();
         Ok(Given { performed, pictures, speed })
     }
 

@@ -1,0 +1,81 @@
+//! What a reader holds is a small multiple of the file's size, whatever the file promises.
+
+use std::path::Path;
+
+use super::*;
+
+/// What a reader may hold whatever the file, e.g. a decoder's window.
+const FREE: u64 = 1 << 20;
+
+/// Bytes held at a time while a file of this name is read.
+fn held(name: &str, bytes: &[u8]) -> u64 {
+    let selection = Selection::default();
+    let read = || {
+        if let Err(error) = parse_as(Path::new(name), bytes, &selection) {
+            assert!(!format!("{:?}", miette::Report::new(error)).is_empty());
+        }
+    };
+    allocation_counter::measure(read).bytes_max
+}
+
+#[test]
+fn good_files_are_read_in_a_small_multiple_of_their_size() {
+    let values: Vec<f64> = (0..200_000).map(|k| (f64::from(k) * 0.37).sin()).collect();
+    let sequence = Sequence::new("a", 2, values).unwrap();
+    let data = Dataset::new(vec!["x".into(), "y".into()], vec![sequence]).unwrap();
+    let fields = [Field { name: "", data: &data }];
+    let files = [
+        ("x.csv", text_out::csv(&fields, ',').into_bytes(), 10),
+        ("x.txt", text_out::blocks(&fields).into_bytes(), 10),
+        ("x.npy", npy::write("x.npy", &fields).unwrap(), 5),
+        ("x.npz", npz::write("x.npz", &fields).unwrap(), 5),
+        ("x.mcap", mcap::tests::some_joints(), 50),
+    ];
+    for (name, bytes, factor) in files {
+        let held = held(name, &bytes);
+        assert!(held < FREE + factor * bytes.len() as u64, "{name}: {held} for {} bytes", bytes.len());
+    }
+}
+
+#[test]
+fn promises_of_terabytes_cost_nothing() {
+    let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000, 100000, 1), }\n";
+    let mut npy = b"\x93NUMPY\x01\x00".to_vec();
+    npy.extend((header.len() as u16).to_le_bytes());
+    npy.extend(header.as_bytes());
+    npy.extend([0; 64]);
+    // An archive whose member says that it holds 2^40 bytes, in its own header and in the directory.
+    let member = npy::array_bytes(&[2, 2], [1.0, 2.0, 3.0, 4.0].into_iter());
+    let mut npz = super::tests::archive(&[("a.npy", member.clone())]);
+    let size = (member.len() as u32).to_le_bytes();
+    for at in (0..npz.len() - 4).collect::<Vec<_>>() {
+        if npz[at..at + 4] == size {
+            npz[at..at + 4].copy_from_slice(&0xffff_fff0_u32.to_le_bytes());
+        }
+    }
+    let mut mcap = mcap::tests::some_joints();
+    let chunk = mcap.windows(9).position(|window| window[0] == 0x06 && window[7..9] == [0, 0]).unwrap();
+    mcap[chunk + 25..chunk + 33].copy_from_slice(&(1_u64 << 42).to_le_bytes());
+    for (name, bytes) in [("x.npy", npy), ("x.npz", npz), ("x.mcap", mcap)] {
+        // What an archive says of its members' sizes is not asked at all: they are read until they end.
+        assert!(name == "x.npz" || parse_as(Path::new(name), &bytes, &Selection::default()).is_err(), "{name}");
+        assert!(held(name, &bytes) < FREE, "{name}: {}", held(name, &bytes));
+    }
+}
+
+/// Deflate packs zeros into a thousandth, and nothing into less.
+#[test]
+fn an_archive_unpacks_to_some_thousand_times_its_size_at_most() {
+    use std::io::{Cursor, Write};
+    use zip::write::SimpleFileOptions;
+
+    let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
+    let options = SimpleFileOptions::default().compression_method(zip::CompressionMethod::Deflated);
+    for index in 0..3 {
+        archive.start_file(format!("{index}.npy"), options).unwrap();
+        archive.write_all(&npy::array_bytes(&[3_000_000, 1], std::iter::repeat_n(0.0, 3_000_000))).unwrap();
+    }
+    let bytes = archive.finish().unwrap().into_inner();
+    let held = held("x.npz", &bytes);
+    assert!(held < 5000 * bytes.len() as u64, "{held} for {} bytes", bytes.len());
+}
