@@ -42,12 +42,12 @@ pub struct ErrorRegressionOptions {
 }
 
 impl ErrorRegressionOptions {
-    /// A window of 20 steps and 10 iterations of Adam, which suits most networks; every channel senses, and the window
+    /// A window of 50 steps and 10 iterations of Adam, which suits most networks; every channel senses, and the window
     /// runs in the closed loop.
     #[must_use]
     pub fn new(channels: usize) -> Self {
         Self {
-            window: 20,
+            window: 50,
             iterations: 10,
             ascent: Ascent::Adam { rate: 0.05 },
             max_norm: None,

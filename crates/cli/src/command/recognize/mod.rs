@@ -48,7 +48,7 @@ Examples:
   scrnn recognize runs/lissajous new.csv --starts 40 --out states.npz
   scrnn recognize runs/lissajous new.csv --observed 100 --completed whole.csv
   scrnn generate runs/lissajous --initial-state states.npz
-  scrnn recognize runs/interact new.csv --online --window 20 --steps 10 --deadline 5
+  scrnn recognize runs/interact new.csv --online --deadline 5
   robot | scrnn recognize runs/interact - --online --json | controller")]
 pub struct Arguments {
     /// A run folder or a checkpoint file

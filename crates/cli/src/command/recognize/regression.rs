@@ -12,7 +12,7 @@ use crate::failure::{Failure, Result};
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Error regression")]
 pub struct RegressionArguments {
-    /// Steps in the sliding window [default: 20]
+    /// Steps in the sliding window [default: 50]
     #[arg(long, value_name = "W")]
     window: Option<usize>,
     /// Updates of the internal state for each sample [default: 10]

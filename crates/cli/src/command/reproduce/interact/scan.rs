@@ -61,24 +61,24 @@ pub fn settings(channels: usize) -> Vec<Setting> {
         of("default", &|_| {}),
         of("window 5", &|options| options.window = 5),
         of("window 10", &|options| options.window = 10),
+        of("window 20", &|options| options.window = 20),
         of("window 30", &|options| options.window = 30),
-        of("window 50", &|options| options.window = 50),
+        of("window 70", &|options| options.window = 70),
         of("1 step", &|options| options.iterations = 1),
         of("3 steps", &|options| options.iterations = 3),
         of("30 steps", &|options| options.iterations = 30),
         of("momentum, the thesis' rate", &momentum(thesis, None)),
         of("momentum, 10 times that", &momentum(10.0 * thesis, None)),
         of("momentum, 100 times that", &momentum(100.0 * thesis, None)),
-        of("momentum, the thesis' rate, window 50", &|options| {
-            momentum(thesis, None)(options);
-            options.window = 50;
+        of("momentum, 10 times that, window 20", &|options| {
+            momentum(10.0 * thesis, None)(options);
+            options.window = 20;
         }),
         of("momentum 1e-3, gradient to 10", &momentum(1e-3, Some(10.0))),
         of("momentum 1e-3, gradient to 100", &momentum(1e-3, Some(100.0))),
         of("momentum 1e-2, gradient to 1", &momentum(1e-2, Some(1.0))),
         of("momentum 1e-2, gradient to 20", &momentum(1e-2, Some(20.0))),
         of("Adam 0.02", &adam(0.02)),
-        of("Adam 0.05", &adam(0.05)),
         of("Adam 0.1", &adam(0.1)),
     ]
 }
