@@ -67,17 +67,17 @@ pub fn messages(
         _ => return Err(RecordingProblem::NotMcap),
     };
     let mut reader = Reader { schemas: BTreeMap::new(), channels: BTreeMap::new(), count: 0 };
-    let mut unpacked = 0;
+    let mut unpacked = 0_u64;
     loop {
         let Some((opcode, mut body)) = rest.record() else { return Err(RecordingProblem::CutOff) };
         match opcode {
             opcode::FOOTER => break,
             opcode::CHUNK => {
                 let chunk = Chunk::parse(&mut body).ok_or(RecordingProblem::Damaged("a chunk's header ends early"))?;
-                unpacked += chunk.size;
+                unpacked = unpacked.saturating_add(chunk.size);
                 let allowed = FREE + LARGEST_RATIO * bytes.len() as u64;
-                if chunk.size > allowed || unpacked > allowed {
-                    return Err(RecordingProblem::TooLarge { unpacked: chunk.size.max(unpacked), allowed });
+                if unpacked > allowed {
+                    return Err(RecordingProblem::TooLarge { unpacked, allowed });
                 }
                 let content = chunk.unpack()?;
                 let mut records = Bytes(&content);

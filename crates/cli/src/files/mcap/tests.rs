@@ -245,6 +245,17 @@ fn a_header_that_promises_terabytes_is_refused() {
     huge[chunk + 1..chunk + 9].copy_from_slice(&u64::MAX.to_le_bytes());
     assert_eq!(said(&huge, &Selection::default()).0, "r.mcap: the recording is cut off");
 
+    // Found by fuzzing: the sizes of two chunks, one of them as large as numbers go, were added.
+    let several = recording(plain().chunk_size(Some(200)), &ten());
+    let chunks: Vec<usize> =
+        (0..several.len() - 9).filter(|&at| several[at] == 0x06 && several[at + 3..at + 9] == [0; 6]).collect();
+    assert!(chunks.len() > 1);
+    let mut huge = several;
+    let last = chunks[chunks.len() - 1];
+    huge[last + 25..last + 33].copy_from_slice(&u64::MAX.to_le_bytes());
+    let (message, _) = said(&huge, &Selection::default());
+    assert!(message.starts_with("r.mcap: it promises to unpack to 18446744073709551615 bytes"), "{message}");
+
     // A chunk that unpacks to more than it says stops there.
     let bomb = repacked(&bytes, "zstd", |content| {
         ruzstd::encoding::compress_to_vec(
