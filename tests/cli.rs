@@ -4,6 +4,8 @@
 mod experiments;
 #[path = "cli/extremes.rs"]
 mod extremes;
+#[path = "cli/following.rs"]
+mod following;
 #[path = "cli/reaching.rs"]
 mod reaching;
 #[path = "cli/recordings.rs"]

@@ -287,3 +287,24 @@ fn python_reads_recordings_with_schemas_that_are_foxgloves_own() {
     std::fs::write(place.folder.path().join("cut.mcap"), &bytes[..bytes.len() - 100]).unwrap();
     assert_ne!(place.script("read_recording.py", "cut.mcap").status.code(), Some(0));
 }
+
+#[test]
+fn python_reads_what_a_robot_did_that_reaches() {
+    let Some(place) = Place::new() else { return };
+    let experiment = "name = \"reach\"\n[data]\ntask = \"reach\"\nsequences = 3\nsteps = 24\n[[network.groups]]\n\
+                      name = \"c\"\nunits = 6\ntime_constant = 2.0\n[training]\nepochs = 20\noptimiser = \"adam\"\n";
+    place.write("reach.toml", experiment);
+    place.scrnn("train reach.toml --out run");
+    place.scrnn("simulate reach run --position 2 --cycles 1 --mcap reach.mcap");
+    let found: serde_json::Value = serde_json::from_str(&place.agrees("read_recording.py", "reach.mcap")).unwrap();
+    let attached = found["attachments"].as_object().unwrap();
+    assert!(attached["self/robot.urdf"].as_str().unwrap().contains("<robot name=\"nao\">"));
+    assert!(attached["experiment.toml"].as_str().unwrap().contains("task = \"reach\""));
+    let count = |topic: &str| found["counts"][topic].as_u64().unwrap_or(0);
+    assert_eq!((count("/sensed"), count("/predicted_mean"), count("/predicted_variance")), (12, 12, 12));
+    // Ten pictures in each of six seconds, and the one at the beginning.
+    let pictures = ["/scene", "/transforms", "/joint_states", "/joint_targets", "/contacts"];
+    assert!(pictures.iter().all(|topic| count(topic) == 61), "{}", found["counts"]);
+    let sphere = found["last"]["/scene"]["entities"].as_array().unwrap().iter().find(|one| one["id"] == "sphere");
+    assert!(sphere.is_some(), "{}", found["last"]["/scene"]);
+}

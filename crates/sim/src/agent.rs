@@ -281,6 +281,7 @@ pub fn perform<E: From<Error>>(
     for sample in 0..*samples {
         if let Some((_, to)) = shift.filter(|(at, _)| *at == sample) {
             stage.move_sphere(to)?;
+            watch.interrupt();
         }
         let sensed = stage.angles();
         let decision = driver.decide(&sensed)?;

@@ -114,7 +114,7 @@ fn regression_on_phase_and_gaze_follows_what_it_was_fitted_to() {
     let arm = |phase: f64, yaw: f64| (std::f64::consts::TAU * phase).sin() + yaw;
     let mut points = Vec::new();
     for k in 0..600 {
-        let yaw = -0.6 + 0.3 * f64::from(k % 3);
+        let yaw = -0.6 + 0.3 * f64::from(k / 12 % 3);
         let given = MixtureDriver::given(k as usize, 12, &[yaw, 0.1 * yaw]);
         let value = arm(given[0], yaw);
         points.extend(given);

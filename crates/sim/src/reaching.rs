@@ -43,8 +43,9 @@ const NORMAL: [f64; 3] = [-0.502_5, -0.703_5, 0.502_5];
 const TOUCHING: [[f64; 4]; 3] =
     [[0.1180, -0.8498, -0.1390, 0.9671], [0.2501, -0.6139, 0.0899, 1.2226], [0.2470, -0.1307, 0.0918, 1.0538]];
 
-/// From a touching arm to the middle of the postures after retraction.
-pub const RETRACTION: [f64; 4] = [-0.60, -0.25, 0.70, -0.55];
+/// From a touching arm to the middle of the postures after retraction: high enough to be clear of the sphere, and not so far
+/// to the right that the shoulder comes near its limit.
+pub const RETRACTION: [f64; 4] = [-0.66, -0.15, 0.70, -0.55];
 
 /// Sets the numbers of drawn places apart from a seed's others.
 const PLACES: u64 = 0x706C_6163_6573;

@@ -167,7 +167,7 @@ mod tests {
     fn performance() -> Vec<u8> {
         let robot = load_one_armed().unwrap();
         let y = POSITIONS[2];
-        let arms = vec![touching_arm(&robot, y, [0.0; 3], &[0.0; 4]).unwrap(), retracted_arm(&robot, y).unwrap()];
+        let arms = [touching_arm(&robot, y, [0.0; 3], &[0.0; 4]).unwrap(), retracted_arm(&robot, y).unwrap()];
         let mut driver = Replay::new(arms.iter().flat_map(|arm| [*arm; 4]).collect()).unwrap();
         let performance = Performance { y, samples: 12, shift: None, frozen: None, world: WorldOptions::default() };
         let mut recording =

@@ -76,6 +76,11 @@ impl Watch {
         None
     }
 
+    /// The sphere was put elsewhere: what comes now belongs to another cycle.
+    pub fn interrupt(&mut self) {
+        self.near = false;
+    }
+
     /// All cycles so far; the last may not be over.
     #[must_use]
     pub fn cycles(&self) -> &[Cycle] {
@@ -143,6 +148,18 @@ mod tests {
     fn a_graze_elsewhere_is_no_touch() {
         let (cycles, contacts) = watch(&[(0.1, 0.1), (-0.002, 0.03), (0.02, 0.01), (0.1, 0.1)]);
         assert!(!cycles[0].touched && contacts.is_empty());
+    }
+
+    #[test]
+    fn a_sphere_that_is_taken_away_ends_the_cycle() {
+        let mut watch = Watch::default();
+        let moment = |time, gap, aim| Moment { time, gap, aim, hand: [0.0; 3] };
+        assert_eq!(watch.observe(moment(0.0, 0.001, 0.001)), Some(0));
+        watch.interrupt();
+        // It lies now where the hand overlaps it, but not as it was taught to.
+        assert_eq!(watch.observe(moment(1.0, -0.014, 0.05)), None);
+        let cycles = watch.finish();
+        assert_eq!((cycles.len(), cycles[0].touched, cycles[0].touch.time, cycles[1].touched), (2, true, 0.0, false));
     }
 
     #[test]

@@ -98,7 +98,7 @@ pub enum TaskName {
     LimitCycle,
     /// NAO's head and arm, as a tutor teaches it to touch a sphere, in simulation (thesis 4.2)
     Reach,
-    /// Two robots in a simulated world: one moves an object left and right, the other follows (5.2)
+    /// Two robots in a simulated world: one moves an object left and right, the other follows (thesis 5.2)
     Interact,
 }
 

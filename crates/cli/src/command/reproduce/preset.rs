@@ -129,6 +129,23 @@ mod tests {
     }
 
     #[test]
+    fn the_robot_learns_scaled_angles_by_the_settings_of_chapter_4() {
+        for (kind, exact) in [(REACH, false), (REACH_EXACT, true)] {
+            for preset in [Preset::Thesis, Preset::Fast] {
+                let experiment = kind.experiment(preset, 3, None, &[]).unwrap();
+                let (network, data) = (&experiment.network, &experiment.data);
+                assert_eq!((network.groups[0].units, network.groups[0].time_constant, network.delay), (30, 2.0, 1));
+                assert_eq!((network.initial_state_variance, network.variance_floor), (0.001, 0.0));
+                assert_eq!((data.sequences, data.steps, data.exact_positions), (Some(30), Some(180), Some(exact)));
+                assert_eq!(serde_json::to_value(&data.scaling).unwrap(), "fit");
+            }
+            let thesis = kind.experiment(Preset::Thesis, 3, None, &[]).unwrap().training;
+            let momentum = thesis.momentum.unwrap();
+            assert_eq!((thesis.epochs, momentum.rate, momentum.momentum), (500_000, 1e-4, 0.9));
+        }
+    }
+
+    #[test]
     fn only_keys_that_the_measures_allow_can_be_changed() {
         let changed = |text: &str| LISSAJOUS.experiment(Preset::Fast, 1, None, &[text.parse().unwrap()]);
         let decay = changed("training.adam.weight_decay=0.5").unwrap().training.adam.unwrap().weight_decay;

@@ -81,7 +81,7 @@ pub fn by_phase(
     scale: &[f64],
 ) -> ByPhase {
     let n = REACHING.len();
-    let [mut within, mut predicted, mut residual, mut driven] = [const { () }; 4].map(|()| Bins::new());
+    let [mut within, mut predicted, mut residual, mut driven] = std::array::from_fn(|_| Bins::new());
     for ((demonstration, sequence), generated) in demonstrations.iter().zip(data.sequences()).zip(open) {
         let mut own: Vec<Vec<usize>> = vec![Vec::new(); CYCLE];
         for sample in SETTLING..sequence.len() {
@@ -107,8 +107,8 @@ pub fn by_phase(
     for (decisions, cycles) in driving {
         for (k, decision) in decisions.iter().enumerate().skip(SETTLING) {
             let Some(bin) = bin(k + 1, cycles) else { continue };
-            for channel in VISION..n {
-                driven.add(bin, decision.variance[channel] * scale[channel].powi(2));
+            for (variance, scale) in decision.variance[VISION..].iter().zip(&scale[VISION..]) {
+                driven.add(bin, variance * scale.powi(2));
             }
         }
     }

@@ -11,9 +11,10 @@ use scrnn_sim::reaching::{CYCLE, POSITIONS};
 use scrnn_sim::reaching_recording::ReachingRecording;
 use scrnn_sim::touching::Cycle;
 use scrnn_sim::world::WorldOptions;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::args::Shared;
+use crate::experiment::Experiment;
 use crate::failure::{Ending, Failure, Result};
 use crate::files;
 use crate::output;
@@ -169,8 +170,8 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
 }
 
 fn recording(trained: &Trained, arguments: &Arguments) -> Result<ReachingRecording<Cursor<Vec<u8>>>> {
-    let experiment = trained.notes.as_ref().map(|notes| serde_json::to_string_pretty(&notes.experiment));
-    let experiment = experiment.transpose().unwrap_or_default();
+    let experiment = trained.notes.as_ref().and_then(|notes| Experiment::deserialize(&notes.experiment).ok());
+    let experiment = experiment.and_then(|experiment| toml::to_string(&experiment).ok());
     let (seed, position) = (arguments.seed.to_string(), arguments.position.0.to_string());
     let notes = [("task", "reach"), ("seed", seed.as_str()), ("position", position.as_str())];
     let mut recording = ReachingRecording::new(Cursor::new(Vec::new()), experiment.as_deref(), &notes)?;

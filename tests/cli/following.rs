@@ -1,0 +1,153 @@
+//! A network beside samples that arrive: `recognize --online`, and `simulate interact` with what it learns from.
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+use super::{Place, SINE, numbers};
+
+fn trained() -> Place {
+    let place = Place::with(SINE);
+    place.ok("train sine.toml --out run -q");
+    place.ok("data sinusoid --steps 60 --seed 3 --out new.csv");
+    place
+}
+
+#[test]
+fn a_recorded_sequence_is_followed_sample_by_sample() {
+    let place = trained();
+    let line = "recognize run new.csv --online --window 8 --steps 5 --ahead 3 --at 1,30 --json";
+    let found = place.json(line);
+    let sequence = &found["sequences"][0];
+    let steps = sequence["steps"].as_array().unwrap();
+    assert_eq!((steps.len(), sequence["samples"].as_u64()), (60, Some(60)));
+    assert_eq!((steps[0]["iterations"].as_u64(), steps[1]["iterations"].as_u64()), (Some(0), Some(5)));
+    let gained =
+        steps[1..].iter().map(|step| numbers(&step["ln_likelihood"])).filter(|pair| pair[1] >= pair[0]).count();
+    assert!(gained > 40, "{gained} of 59");
+    // Before xi samples there is no window; later it is as long as asked for, and so is the future.
+    let first = &steps[0]["view"];
+    assert_eq!((numbers(&first["postdicted"]).len(), numbers(&first["predicted"]).len()), (0, 4));
+    let view = &steps[29]["view"];
+    assert_eq!((view["from"].as_u64(), numbers(&view["postdicted"]).len()), (Some(23), 8));
+    assert_eq!((numbers(&view["predicted"]).len(), numbers(&view["variance"]).len()), (4, 4));
+    assert_eq!(numbers(&view["contexts"]).len(), 8 * 6);
+    assert!(steps[10].get("view").is_none());
+    let latency = &sequence["latency"];
+    assert!(latency["median"].as_f64() <= latency["p99"].as_f64() && latency["missed"].is_null(), "{latency}");
+
+    // The file has each sample as it was predicted and as it was postdicted.
+    let table = place.ok("recognize run new.csv --online --window 8 --steps 5 --out followed.csv");
+    assert!(table.starts_with("sequence  samples  ln L in the window"), "{table}");
+    let text = place.text("followed.csv");
+    assert!(text.starts_with("sequence,step,mean_y,variance_y,postdicted_y,context_context1"), "{text}");
+    assert_eq!(text.lines().count(), 60);
+    let again: Value = place.json(line);
+    let without_times = |value: &Value| numbers(&value["sequences"][0]["steps"][29]["view"]["predicted"]);
+    assert_eq!(without_times(&found), without_times(&again));
+}
+
+#[test]
+fn a_stream_is_answered_line_by_line_with_what_a_file_gives() {
+    let place = trained();
+    let stream = |arguments: &str, input: &str| {
+        let mut command = Command::cargo_bin("scrnn").unwrap();
+        let arguments = arguments.split_whitespace();
+        let output = command.current_dir(&place.0).args(arguments).write_stdin(input).output().unwrap();
+        (output.status.code(), String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap())
+    };
+    let samples = place.text("new.csv");
+    let (code, out, told) = stream("recognize run - --online --window 8 --steps 5 --json", &samples);
+    assert_eq!(code, Some(0), "{told}");
+    let lines: Vec<Value> = out.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!(lines.len(), 60);
+    assert!(told.contains("ms a sample"), "{told}");
+    let file = place.json("recognize run new.csv --online --window 8 --steps 5 --at 40 --json");
+    assert_eq!(lines[39]["view"], file["sequences"][0]["steps"][39]["view"]);
+    // A table for those who do not want JSON: the next sample as predicted.
+    let (_, table, _) = stream("recognize run - --online --window 8 --steps 5 -q", "0.1\n0.2\n");
+    assert!(table.starts_with("sample,iterations,milliseconds,y\n1,0,"), "{table}");
+    assert_eq!(table.lines().count(), 3);
+    let (code, _, told) = stream("recognize run - --online", "0.1\nabc\n");
+    assert!(code == Some(2) && told.contains("line 2, y is `abc`"), "{told}");
+}
+
+#[test]
+fn a_deadline_is_kept_when_the_steps_do_not_fit() {
+    let place = trained();
+    let found = place.json("recognize run new.csv --online --window 20 --steps 1000000 --deadline 20 --json");
+    let sequence = &found["sequences"][0];
+    let iterations = |step: &Value| step["iterations"].as_u64().unwrap();
+    assert!(sequence["steps"].as_array().unwrap()[1..].iter().all(|step| (1..1_000_000).contains(&iterations(step))));
+    // Whoever shares the machine may still take it away for longer than that now and then.
+    let missed = sequence["latency"]["missed"].as_u64().unwrap();
+    assert!(missed < 30, "{missed} of 60 missed");
+}
+
+#[test]
+fn requests_that_do_not_go_together_are_refused() {
+    let place = trained();
+    for (line, expected) in [
+        ("recognize run new.csv --window 5", "go with --online"),
+        ("recognize run new.csv --online --optimiser adam --momentum 0.5", "--momentum does not go with"),
+        ("recognize run new.csv --online --deadline 0", "--deadline is 0"),
+        ("recognize run new.csv --online --sequence 7", "there is no learned sequence 7"),
+        ("recognize run new.csv --online --closed-channels z", "no channel `z`"),
+        ("recognize run new.csv --online --window 0", "the window is 0"),
+        ("recognize run - --online --out f.csv", "do not go with a stream"),
+        ("simulate interact run --order RLLLR", "the network's channels are y"),
+        ("data sinusoid --out world.mcap", "this task has none"),
+        ("data interact --sequences 40", "40 sequences of 470 samples"),
+    ] {
+        let (_, told) = place.fails(2, line);
+        assert!(told.contains(expected), "{line}: {told}");
+    }
+}
+
+const INTERACT: &str = r#"
+name = "interact"
+[data]
+task = "interact"
+sequences = 2
+steps = 40
+[network]
+delay = 5
+[[network.groups]]
+name = "fast"
+units = 6
+time_constant = 5.0
+learns_initial_state = false
+[[network.groups]]
+name = "slow"
+units = 3
+time_constant = 100.0
+receives_input = false
+drives_output = false
+[training]
+epochs = 5
+optimiser = "adam"
+"#;
+
+#[test]
+fn two_robots_are_recorded_learned_from_and_followed() {
+    let place = Place::with(INTERACT);
+    place.ok("data interact --sequences 1 --steps 12 --out one.mcap");
+    assert!(place.read("one.mcap").starts_with(b"\x89MCAP0\r\n"));
+    place.ok("train sine.toml --out run -q");
+    let line = "simulate interact run --order LLLLR --initial-state corresponding --ers --steps 1 --json";
+    let found = place.json(&format!("{line} --out followed.csv --mcap world.mcap"));
+    let trial = &found["trials"][0];
+    assert_eq!((trial["order"].as_str(), trial["initial_state"].as_str()), (Some("LLLLR"), Some("LLLLR")));
+    let branches = trial["branches"].as_array().unwrap();
+    assert_eq!(branches.len(), 5);
+    assert_eq!((branches[4]["side"].as_str(), branches[0]["side"].as_str()), (Some("R"), Some("L")));
+    assert!(branches.iter().all(|branch| branch["reaction_time"].as_u64().unwrap() <= 90));
+    let text = place.text("followed.csv");
+    assert!(text.starts_with("sequence,step,sensed_object_x,"), "{}", &text[..200]);
+    assert_eq!(text.lines().count(), 1 + 470 - 5);
+    assert!(place.read("world.mcap").starts_with(b"\x89MCAP0\r\n"));
+    assert_eq!(place.json(line)["trials"][0]["branches"], trial["branches"]);
+    let (_, told) = place.fails(2, "simulate interact run --initial-state RRRRR");
+    assert!(told.contains("did not learn `RRRRR`") && told.contains("LLLLR"), "{told}");
+    let (_, told) = place.fails(2, "simulate interact run --order LX");
+    assert!(told.contains("`LX`"), "{told}");
+}
