@@ -19,6 +19,9 @@ const LARGEST_RATIO: u64 = 1000;
 /// and to these bytes more.
 const FREE: u64 = 4 << 20;
 
+/// What a zstd decoder may look back on: what every decoder grants (RFC 8878), or a whole chunk.
+const WINDOW: u64 = 8 << 20;
+
 mod opcode {
     pub const FOOTER: u8 = 0x02;
     pub const SCHEMA: u8 = 0x03;
@@ -165,7 +168,9 @@ impl<'a> Chunk<'a> {
         match self.compression.as_str() {
             "" => content.extend(self.data),
             "zstd" => {
-                let stream = ruzstd::decoding::StreamingDecoder::new(self.data).map_err(|error| broken(&error))?;
+                let stream =
+                    ruzstd::decoding::StreamingDecoder::new_with_max_window_size(self.data, WINDOW.max(self.size));
+                let stream = stream.map_err(|error| broken(&error))?;
                 stream.take(most).read_to_end(&mut content).map_err(|error| broken(&error))?;
             }
             "lz4" => {
