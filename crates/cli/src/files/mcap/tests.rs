@@ -260,7 +260,7 @@ fn a_header_that_promises_terabytes_is_refused() {
     let (message, _) = said(&huge, &Selection::default());
     assert!(message.starts_with("r.mcap: it promises to unpack to 18446744073709551615 bytes"), "{message}");
 
-    // Found by fuzzing: a frame of some bytes that asks for a window of 64 MiB.
+    // A frame of some bytes that asks for a window of 64 MiB.
     let window = repacked(&bytes, "zstd", |_| vec![0x28, 0xb5, 0x2f, 0xfd, 0x00, 0x80, 0x01, 0x00, 0x00]);
     let (message, _) = said(&window, &Selection::default());
     assert!(message.starts_with("r.mcap: a chunk cannot be unpacked (zstd): "), "{message}");
