@@ -98,7 +98,7 @@ fn requests_that_do_not_go_together_are_refused() {
         ("recognize run new.csv --online --window 0", "the window is 0"),
         ("recognize run - --online --out f.csv", "do not go with a stream"),
         ("simulate interact run --order RLLLR", "the network's channels are y"),
-        ("data sinusoid --out world.mcap", "has none"),
+        ("data sinusoid --out world.mcap", "sinusoid has none"),
         ("data interact --sequences 40", "40 sequences of 470 samples"),
     ] {
         let (_, told) = place.fails(2, line);

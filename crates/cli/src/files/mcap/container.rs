@@ -19,6 +19,9 @@ const LARGEST_RATIO: u64 = 1000;
 /// and to these bytes more.
 const FREE: u64 = 4 << 20;
 
+/// What a zstd decoder may look back on: what every decoder grants (RFC 8878), or a whole chunk.
+const WINDOW: u64 = 8 << 20;
+
 mod opcode {
     pub const FOOTER: u8 = 0x02;
     pub const SCHEMA: u8 = 0x03;
@@ -67,17 +70,17 @@ pub fn messages(
         _ => return Err(RecordingProblem::NotMcap),
     };
     let mut reader = Reader { schemas: BTreeMap::new(), channels: BTreeMap::new(), count: 0 };
-    let mut unpacked = 0;
+    let mut unpacked = 0_u64;
     loop {
         let Some((opcode, mut body)) = rest.record() else { return Err(RecordingProblem::CutOff) };
         match opcode {
             opcode::FOOTER => break,
             opcode::CHUNK => {
                 let chunk = Chunk::parse(&mut body).ok_or(RecordingProblem::Damaged("a chunk's header ends early"))?;
-                unpacked += chunk.size;
+                unpacked = unpacked.saturating_add(chunk.size);
                 let allowed = FREE + LARGEST_RATIO * bytes.len() as u64;
-                if chunk.size > allowed || unpacked > allowed {
-                    return Err(RecordingProblem::TooLarge { unpacked: chunk.size.max(unpacked), allowed });
+                if unpacked > allowed {
+                    return Err(RecordingProblem::TooLarge { unpacked, allowed });
                 }
                 let content = chunk.unpack()?;
                 let mut records = Bytes(&content);
@@ -165,7 +168,9 @@ impl<'a> Chunk<'a> {
         match self.compression.as_str() {
             "" => content.extend(self.data),
             "zstd" => {
-                let stream = ruzstd::decoding::StreamingDecoder::new(self.data).map_err(|error| broken(&error))?;
+                let stream =
+                    ruzstd::decoding::StreamingDecoder::new_with_max_window_size(self.data, WINDOW.max(self.size));
+                let stream = stream.map_err(|error| broken(&error))?;
                 stream.take(most).read_to_end(&mut content).map_err(|error| broken(&error))?;
             }
             "lz4" => {

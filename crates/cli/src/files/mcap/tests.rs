@@ -245,6 +245,26 @@ fn a_header_that_promises_terabytes_is_refused() {
     huge[chunk + 1..chunk + 9].copy_from_slice(&u64::MAX.to_le_bytes());
     assert_eq!(said(&huge, &Selection::default()).0, "r.mcap: the recording is cut off");
 
+    // Found by fuzzing: the sizes of two chunks, one of them as large as numbers go, were added.
+    let several = recording(plain().chunk_size(Some(200)), &ten());
+    let mut chunks = Vec::new();
+    let mut at = 8;
+    while at + 9 < several.len() {
+        chunks.extend((several[at] == 0x06).then_some(at));
+        at += 9 + u64::from_le_bytes(several[at + 1..at + 9].try_into().unwrap()) as usize;
+    }
+    assert!(chunks.len() > 1);
+    let mut huge = several;
+    let last = chunks[chunks.len() - 1];
+    huge[last + 25..last + 33].copy_from_slice(&u64::MAX.to_le_bytes());
+    let (message, _) = said(&huge, &Selection::default());
+    assert!(message.starts_with("r.mcap: it promises to unpack to 18446744073709551615 bytes"), "{message}");
+
+    // A frame of some bytes that asks for a window of 64 MiB.
+    let window = repacked(&bytes, "zstd", |_| vec![0x28, 0xb5, 0x2f, 0xfd, 0x00, 0x80, 0x01, 0x00, 0x00]);
+    let (message, _) = said(&window, &Selection::default());
+    assert!(message.starts_with("r.mcap: a chunk cannot be unpacked (zstd): "), "{message}");
+
     // A chunk that unpacks to more than it says stops there.
     let bomb = repacked(&bytes, "zstd", |content| {
         ruzstd::encoding::compress_to_vec(
