@@ -44,8 +44,10 @@ fn the_head_lags_behind_so_that_the_image_shows_the_movement() {
     let leftmost = (20..70).map(x).fold(f64::INFINITY, f64::min);
     assert!((110.0..130.0).contains(&leftmost), "{leftmost}");
     assert!((x(69) - 160.0).abs() < 5.0, "{}", x(69));
+    // The head still lags behind the way back when the object goes on to the right. For an object that stays in a plane, and a
+    // head that does not nod, this was computed apart: 217.
     let rightmost = (110..140).map(x).fold(0.0, f64::max);
-    assert!((190.0..215.0).contains(&rightmost), "{rightmost}");
+    assert!((210.0..225.0).contains(&rightmost), "{rightmost}");
     // What the head's yaw settles at was computed apart from this code.
     let yaw = data.sample(69)[2];
     assert!((yaw - 0.565).abs() < 0.02, "{yaw}");
