@@ -211,6 +211,9 @@ fn check(network: &Network, data: &Dataset, options: &RecognitionOptions) -> Res
     if options.warm_starts.is_empty() {
         return setting("the list of starts", "empty".to_owned(), "at least one kind");
     }
+    if !(0.0..1.0).contains(&options.beta2) {
+        return setting("beta2", options.beta2.to_string(), "a number from 0 to below 1");
+    }
     let spread = ("random_spread", options.random_spread);
     for (what, value) in [("rate", options.rate), ("initial_state_variance", options.initial_state_variance), spread] {
         if !(value > 0.0 && value.is_finite()) {

@@ -148,7 +148,11 @@ fn a_channel_that_never_changes_never_leaves_a_network_without_numbers() {
             let (outcome, nll) = run(&mut learner);
             assert!(outcome != Outcome::Stopped);
             let best = nll.iter().copied().fold(f64::INFINITY, f64::min);
-            assert!(best < nll[0] - 3.0, "{optimiser:?}, {on_divergence:?}: {} to {best}", nll[0]);
+            // Adam goes on for ever; momentum at this rate is thrown out of its valley after a few steps.
+            let gain = if matches!(optimiser, Optimiser::Adam(_)) { 3.0 } else { 1.0 };
+            assert!(best < nll[0] - gain, "{optimiser:?}, {on_divergence:?}: {} to {best}", nll[0]);
+            assert!(nll.iter().all(|nll| nll.is_finite()), "{optimiser:?}, {on_divergence:?}");
+            assert!(learner.network().parameters.as_slice().iter().all(|value| value.is_finite()));
             if on_divergence == OnDivergence::Recover {
                 assert!(nll[nll.len() - 1] < best + 10.0 + 1e-9, "{optimiser:?}: {best}, then {}", nll[nll.len() - 1]);
             }
