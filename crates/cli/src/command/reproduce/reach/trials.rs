@@ -14,7 +14,7 @@ use scrnn_sim::tutor::Demonstration;
 use scrnn_sim::world::WorldOptions;
 use serde::Serialize;
 
-use super::study::Learned;
+use super::super::study::Learned;
 use crate::failure::{Failure, Result};
 use crate::processor_time::ProcessorTime;
 

@@ -7,8 +7,8 @@ use scrnn_sim::scene::Scene;
 use scrnn_sim::touching::{Cycle, Moment};
 use scrnn_sim::tutor::Demonstration;
 
-use super::reach::{Condition, Findings, Material, channel};
-use super::reach_trials::{Found, Given, decided};
+use super::trials::{Found, Given, decided};
+use super::{Condition, Findings, Material, channel};
 use crate::report::{Block, Chart, Drawing, Figure, Panel, Picture, Pictures, Section, Series, Sheet, Tone, View};
 
 /// Samples of the figures over time: five cycles.
@@ -291,7 +291,7 @@ fn touches(findings: &Findings) -> Block {
 
 /// After shifts.
 fn shifts(findings: &Findings) -> Block {
-    let row = |shift: &super::reach_trials::Shifted| {
+    let row = |shift: &super::trials::Shifted| {
         vec![
             format!("{:.0}", 1e3 * shift.from),
             format!("{:.0}", 1e3 * shift.to),
@@ -369,7 +369,7 @@ fn variance_table(findings: &Findings) -> Block {
 fn drivers(findings: &Findings) -> Block {
     let share = |found: &[Found]| {
         let all: Vec<&Found> = found.iter().collect();
-        if all.is_empty() { "\u{2013}".to_owned() } else { format!("{:.3}", super::reach_trials::pooled_rate(&all)) }
+        if all.is_empty() { "\u{2013}".to_owned() } else { format!("{:.3}", super::trials::pooled_rate(&all)) }
     };
     let row = |condition: &Condition| {
         let between = condition.others().get(..2).unwrap_or_default();
@@ -399,6 +399,6 @@ fn meaning() -> Block {
         "Replay plays the mean of the ten demonstrations at the nearest position and does not look at the sphere. GMM/GMR is \
          Gaussian mixture regression with {} components, as many numbers as the network has: it is told the metronome's phase, \
          which the network must keep by itself, and where the head looks.",
-        super::reach_trials::COMPONENTS
+        super::trials::COMPONENTS
     ))
 }

@@ -1,5 +1,9 @@
 //! NAO learns to reach from demonstrations, and adapts (thesis, chapter 4).
 
+mod page;
+mod trials;
+mod variance;
+
 use scrnn::engine::Engine;
 use scrnn_sim::agent::{Noise, Performance};
 use scrnn_sim::channels::{REACHING, VISION};
@@ -10,15 +14,12 @@ use serde::Serialize;
 
 use super::curves::timely;
 use super::preset::{self, Kind};
-use super::reach_page;
-use super::reach_trials::{
-    Company, Found, Given, Shifted, Trial, Who, pooled_rate, pooled_spread_ratio, samples, still,
-};
-use super::reach_variance::{ByPhase, by_phase};
 use super::study::{Learned, Measure, SeedResult, Study, Verdict};
 use crate::assessment;
 use crate::failure::Result;
 use crate::report::Section;
+use trials::{Company, Found, Given, Shifted, Trial, Who, pooled_rate, pooled_spread_ratio, samples, still};
+use variance::{ByPhase, by_phase};
 
 /// Half way between neighbouring positions.
 const BETWEEN: [f64; 2] = [-0.105, -0.035];
@@ -387,7 +388,7 @@ impl Study for Reach {
     }
 
     fn sections(&self, seed: &SeedResult<Findings>, material: &Material) -> Vec<Section> {
-        reach_page::sections(&seed.findings, material)
+        page::sections(&seed.findings, material)
     }
 }
 
