@@ -147,32 +147,46 @@ fn trainings_that_are_killed_at_random_moments_come_to_the_undisturbed_bits() {
         let begun = Instant::now();
         place.ok(&format!("train sine.toml --out whole --overwrite {options}"));
         let whole = begun.elapsed().as_micros() as u64;
-        let _ = fs::remove_dir_all(place.path("cut"));
-        let mut finished = false;
-        for attempt in 0..40 {
-            let mut child = place.start(&format!("train sine.toml --out cut --resume {options}"));
-            // From before the first file is there to about the end; at last it gets the time it needs.
-            let pause = if attempt < 39 { dice.below(whole / 2 + 2000) } else { 60_000_000 };
-            let until = Instant::now() + Duration::from_micros(pause);
-            while Instant::now() < until && child.try_wait().unwrap().is_none() {
-                std::thread::sleep(Duration::from_micros(200));
-            }
-            if let Some(status) = child.try_wait().unwrap() {
-                assert!(status.success(), "seed {seed}: {}", flat(&child.wait_with_output().unwrap().stderr));
-                finished = true;
+        // On a busy machine the next training may be over before the first kill: then again, with a quicker hand.
+        let mut longest = whole / 2 + 2000;
+        loop {
+            let _ = fs::remove_dir_all(place.path("cut"));
+            let killed = cut(&place, &options, &mut dice, longest);
+            kills += killed.0;
+            early += killed.1;
+            if killed.0 > 0 {
                 break;
             }
-            child.kill().unwrap();
-            child.wait().unwrap();
-            kills += 1;
-            early += u64::from(!place.path("cut/checkpoint.safetensors").exists());
+            assert!(longest > 100, "seed {seed}: no kill came before the end");
+            longest /= 2;
         }
-        assert!(finished, "seed {seed} never came to its end");
         same(&place, "whole", "cut");
         tidy(&place.path("cut"));
     }
     println!("{runs} trainings, {kills} kills, {early} of them before the first checkpoint");
-    assert!(kills >= runs, "only {kills} kills");
+}
+
+/// A training that is killed and resumed until it comes to its end. Kills, and those before the first checkpoint.
+fn cut(place: &Place, options: &str, dice: &mut Dice, longest: u64) -> (u64, u64) {
+    let (mut kills, mut early) = (0, 0);
+    for attempt in 0..40 {
+        let mut child = place.start(&format!("train sine.toml --out cut --resume {options}"));
+        // From before the first file is there to about the end; at last it gets the time it needs.
+        let pause = if attempt < 39 { dice.below(longest) } else { 60_000_000 };
+        let until = Instant::now() + Duration::from_micros(pause);
+        while Instant::now() < until && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(Duration::from_micros(200));
+        }
+        if let Some(status) = child.try_wait().unwrap() {
+            assert!(status.success(), "{options}: {}", flat(&child.wait_with_output().unwrap().stderr));
+            return (kills, early);
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        kills += 1;
+        early += u64::from(!place.path("cut/checkpoint.safetensors").exists());
+    }
+    panic!("{options}: never came to its end");
 }
 
 #[test]
