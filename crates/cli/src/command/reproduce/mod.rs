@@ -229,18 +229,7 @@ fn reproduce<S: Study>(study: &S, arguments: &Arguments, shared: &Shared) -> Res
 fn learned(kind: &Kind, folder: String, experiment: Experiment, training: Training, place: &Path) -> Result<Learned> {
     let Network { topology, parameters } = training.learner.network();
     let network = Network { topology: topology.clone(), parameters: parameters.clone() };
-    let facts = TrainingFacts {
-        network: kind.name,
-        folder,
-        epochs: training.learner.epoch(),
-        nll: training.score.and_then(|score| score.nll),
-        mse: training.score.map(|score| score.mse),
-        seconds: training.seconds,
-        diverged: match &training.outcome {
-            Outcome::Diverged(divergence) => Some(divergence.to_string()),
-            _ => None,
-        },
-    };
+    let facts = TrainingFacts::of(kind.name, &folder, &training);
     Ok(Learned {
         name: kind.name,
         experiment,

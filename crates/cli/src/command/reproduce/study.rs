@@ -3,10 +3,12 @@
 use scrnn::engine::Engine;
 use scrnn::evaluation::mean_and_deviation;
 use scrnn::initial_states::InitialStates;
+use scrnn::learning::Outcome;
 use scrnn::network::Network;
 use serde::Serialize;
 
 use super::preset::Kind;
+use crate::command::train::Training;
 use crate::experiment::Experiment;
 use crate::failure::Result;
 use crate::history::Row;
@@ -77,8 +79,29 @@ pub struct TrainingFacts {
     pub mse: Option<f64>,
     /// Seconds of training, those of earlier processes included.
     pub seconds: f64,
+    /// How often it was brought back to its best network, at half the rate.
+    pub recoveries: u64,
     /// Where it left the finite numbers, if it did.
     pub diverged: Option<String>,
+}
+
+impl TrainingFacts {
+    /// What is told of a training that is over.
+    pub fn of(network: &'static str, folder: &str, training: &Training) -> Self {
+        Self {
+            network,
+            folder: folder.to_owned(),
+            epochs: training.learner.epoch(),
+            nll: training.score.and_then(|score| score.nll),
+            mse: training.score.map(|score| score.mse),
+            seconds: training.seconds,
+            recoveries: training.learner.recoveries(),
+            diverged: match &training.outcome {
+                Outcome::Diverged(divergence) => Some(divergence.to_string()),
+                _ => None,
+            },
+        }
+    }
 }
 
 /// All of one seed.

@@ -111,7 +111,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
             seed,
             engine: &engine,
         };
-        let findings = Findings::of(condition, seed, facts(&run, &training), &subject)?;
+        let findings = Findings::of(condition, seed, TrainingFacts::of("S-MTRNN", &run, &training), &subject)?;
         let material = if seed == arguments.seed && condition.of_thesis {
             Some(Material::of(condition.key, &subject)?)
         } else {
@@ -167,21 +167,6 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
 
 /// Networks for each condition beyond the thesis.
 const BEYOND_NETWORKS: u64 = 3;
-
-fn facts(folder: &str, training: &Training) -> TrainingFacts {
-    TrainingFacts {
-        network: "S-MTRNN",
-        folder: folder.to_owned(),
-        epochs: training.learner.epoch(),
-        nll: training.score.and_then(|score| score.nll),
-        mse: training.score.map(|score| score.mse),
-        seconds: training.seconds,
-        diverged: match &training.outcome {
-            Outcome::Diverged(divergence) => Some(divergence.to_string()),
-            _ => None,
-        },
-    }
-}
 
 /// The result in tables.
 fn told(metrics: &Metrics, path: &Path) -> String {

@@ -300,6 +300,7 @@ mod tests {
                 nll: None,
                 mse: None,
                 seconds: 0.0,
+                recoveries: 0,
                 diverged: None,
             };
             Learned { name: kind.name, experiment, network, initial_states, source, history: Vec::new(), training }
