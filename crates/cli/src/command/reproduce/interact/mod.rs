@@ -20,7 +20,7 @@ use super::metrics::{METRICS, Machine};
 use super::study::TrainingFacts;
 use super::{Arguments, command, seeds};
 use crate::args::Shared;
-use crate::command::train::{Found, Interrupt, Training, train};
+use crate::command::train::{Found, Interrupt, train};
 use crate::experiment::Experiment;
 use crate::failure::{Ending, Failure, Result};
 use crate::output;
