@@ -19,7 +19,7 @@ use scrnn::scaling::Scaling;
 
 use crate::channels::{ARM, REACHING, VISION};
 use crate::error::{Error, Result};
-use crate::reaching::{PERIOD, Stage, retracted_arm, samples_to_steps};
+use crate::reaching::{Stage, retracted_arm, samples_to_steps};
 use crate::touching::{Cycle, Watch};
 use crate::world::WorldOptions;
 
@@ -320,12 +320,6 @@ pub fn perform<E: From<Error>>(
 /// As [`perform`].
 pub fn perform_unseen(performance: &Performance, driver: &mut dyn Driver) -> Result<Performed> {
     perform(performance, driver, &mut |_| Ok::<(), Error>(()))
-}
-
-/// Seconds at a sample.
-#[must_use]
-pub fn seconds(sample: usize) -> f64 {
-    sample as f64 * PERIOD
 }
 
 #[cfg(test)]

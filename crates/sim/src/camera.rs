@@ -46,12 +46,6 @@ impl Camera {
         (0.0..=self.width).contains(&column) && (0.0..=self.height).contains(&row)
     }
 
-    /// Radius of a sphere's image, in pixels of a row, at a distance along the camera's axis.
-    #[must_use]
-    pub fn apparent_radius(&self, radius: f64, distance: f64) -> f64 {
-        self.focal_lengths()[0] * radius / distance
-    }
-
     fn focal_lengths(&self) -> [f64; 2] {
         [(self.width, self.horizontal_view), (self.height, self.vertical_view)]
             .map(|(size, view)| size / 2.0 / (view / 2.0).tan())

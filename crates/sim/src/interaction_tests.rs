@@ -95,3 +95,13 @@ fn noise_has_the_deviation_that_was_asked_for_and_the_same_seed_the_same_bits() 
         assert!((0.75..1.25).contains(&ratio), "{}: {ratio}", CHANNELS[channel]);
     }
 }
+
+#[test]
+fn a_noise_that_is_no_number_is_refused() {
+    for bad in [-0.1, f64::NAN, f64::INFINITY] {
+        let mut options = quiet();
+        options.noise.0[3] = bad;
+        let told = Interaction::new(&[Side::Left], &options, 1).err().unwrap().to_string();
+        assert!(told.contains("a sensor's noise") && told.contains(&bad.to_string()), "{told}");
+    }
+}

@@ -123,12 +123,6 @@ impl Stage {
         Ok(())
     }
 
-    /// Where the sphere lies across.
-    #[must_use]
-    pub fn y(&self) -> f64 {
-        self.y
-    }
-
     /// The robot.
     #[must_use]
     pub fn robot(&self) -> RobotId {
@@ -231,4 +225,30 @@ pub fn gaze_at(robot: &Robot, y: f64) -> Result<[f64; 2]> {
 pub fn places_between(seed: u64, count: usize) -> Vec<f64> {
     let mut random = ChaCha8Rng::seed_from_u64(seed ^ PLACES);
     (0..count).map(|_| random.random_range(POSITIONS[0]..POSITIONS[2])).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_that_does_not_fill_half_a_second_is_refused() {
+        let steps = |step| samples_to_steps(&WorldOptions { step, ..WorldOptions::default() });
+        assert_eq!((steps(0.005).unwrap(), steps(0.5).unwrap()), (100, 1));
+        for step in [0.003, 0.7, f64::NAN] {
+            let told = steps(step).unwrap_err().to_string();
+            assert!(told.contains(&format!("{step} s")) && told.contains("a part of 0.5 s"), "{told}");
+        }
+    }
+
+    #[test]
+    fn a_sphere_out_of_reach_is_refused_and_stays_where_it_was() {
+        let arm = retracted_arm(&nao::load_one_armed().unwrap(), POSITIONS[1]).unwrap();
+        let new = |y| Stage::new(WorldOptions::default(), y, &arm, None);
+        assert!(new(0.1).err().unwrap().to_string().contains("0.1 m"));
+        let mut stage = new(POSITIONS[1]).unwrap();
+        let before = stage.moment().gap;
+        assert!(stage.move_sphere(f64::NAN).is_err());
+        assert_eq!(stage.moment().gap, before);
+    }
 }

@@ -11,6 +11,8 @@ const ARM: &str = r#"<robot name="arm">
     <limit effort="3" velocity="4"/></joint>
 </robot>"#;
 
+const SECOND: &str = r#"<joint name="swivel" type="fixed"><parent link="base"/><child link="upper"/></joint></robot>"#;
+
 fn complaint(from: &str, to: &str) -> String {
     assert!(ARM.contains(from), "{from}");
     Robot::from_urdf(&ARM.replace(from, to)).unwrap_err().to_string()
@@ -52,6 +54,14 @@ fn what_is_wrong_is_named() {
         ),
         (r#"<link name="base"/>"#, r#"<link name="base"/><link name="loose"/>"#, "link `loose`: hangs on no joint"),
         (r#"<parent link="base"/>"#, r#"<parent link="upper"/>"#, "joint `swivel`: does not hang on the root"),
+        ("</robot>", SECOND, "joint `swivel`: is described twice"),
+        (
+            "</robot>",
+            &SECOND.replace("swivel", "other"),
+            "link `upper`: is carried by two joints, `swivel` and `other`",
+        ),
+        (r#"<axis xyz"#, r#"<origin xyz="0 nan 0"/><axis xyz"#, "joint `swivel`: has an origin that holds NaN"),
+        ("<limit", r#"<mimic joint="other"/><limit"#, "joint `swivel`: mimics another joint"),
     ];
     for (from, to, expected) in cases {
         let found = complaint(from, to);
@@ -84,4 +94,10 @@ fn neighbours_may_overlap_and_others_may_not() {
     assert!(
         !may("torso", "r_hand") && !may("torso", "r_forearm") && !may("head", "r_hand") && !may("r_hand", "l_hand")
     );
+}
+
+#[test]
+fn a_link_that_is_not_there_is_told_with_those_that_are() {
+    let told = Robot::from_urdf(ARM).unwrap().link("lower").unwrap_err().to_string();
+    assert!(told.contains("lower") && told.contains("base, upper"), "{told}");
 }

@@ -81,12 +81,6 @@ impl Watch {
         self.near = false;
     }
 
-    /// All cycles so far; the last may not be over.
-    #[must_use]
-    pub fn cycles(&self) -> &[Cycle] {
-        &self.cycles
-    }
-
     /// The cycles, once the movement is over.
     #[must_use]
     pub fn finish(self) -> Vec<Cycle> {

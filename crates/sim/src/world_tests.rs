@@ -237,3 +237,54 @@ fn the_same_calls_give_the_same_bits() {
         std::thread::scope(|scope| [scope.spawn(run), scope.spawn(run)].map(|one| one.join().unwrap()).into());
     assert!(beside.iter().all(|one| *one == alone));
 }
+
+#[test]
+fn a_world_refuses_what_it_cannot_hold() {
+    for step in [0.0, -0.005, f64::NAN, 0.2] {
+        let told = World::new(WorldOptions { step, ..WorldOptions::default() }).err().unwrap().to_string();
+        assert!(told.contains("length of a step") && told.contains("0.1 at most"), "{told}");
+    }
+    let robot = nao::load_one_armed().unwrap();
+    let mut world = World::new(WorldOptions::default()).unwrap();
+    let mut add = |name, posture: &[f64]| {
+        let world_from_root = Isometry3::identity();
+        world.add_robot(&robot, &Placement { name, world_from_root, posture, part: Part::Robot, hands: &["r_hand"] })
+    };
+    let told = add("short", &REST[..5]).unwrap_err().to_string();
+    assert!(told.contains("posture") && told.contains('5') && told.contains('6'), "{told}");
+    let mut twisted = REST;
+    twisted[0] = 9.0;
+    let told = add("twisted", &twisted).unwrap_err().to_string();
+    assert!(told.contains("cannot start at 9 rad"), "{told}");
+    add("self", &REST).unwrap();
+    assert!(add("self", &REST).unwrap_err().to_string().contains("self"));
+    let told = world.body("ball").unwrap_err().to_string();
+    assert!(told.contains("ball") && told.contains("self/r_hand"), "{told}");
+    let ball = |world: &mut World| {
+        world.add_fixed("ball", Part::Object, Shape::Sphere { radius: 0.1 }, Isometry3::translation(1.0, 0.0, 0.0))
+    };
+    ball(&mut world).unwrap();
+    assert!(ball(&mut world).unwrap_err().to_string().contains("ball"));
+    assert!(format!("{world:?}").contains("self/r_hand"));
+}
+
+#[test]
+fn a_cylinder_stands_along_z_as_a_description_says() {
+    let mut world = World::new(WorldOptions::default()).unwrap();
+    let cylinder = Shape::Cylinder { half_length: 0.5, radius: 0.1 };
+    let turned = |turn| Isometry3::from_parts(Translation3::identity(), turn);
+    let column = world.add_fixed("column", Part::Object, cylinder, turned(UnitQuaternion::identity())).unwrap();
+    let mut ball = |name: &str, x: f64, z: f64| {
+        let place = Isometry3::translation(x, 0.0, z);
+        world.add_fixed(name, Part::Object, Shape::Sphere { radius: 0.05 }, place).unwrap()
+    };
+    let (above, beside) = (ball("above", 0.0, 0.6), ball("beside", 0.2, 0.3));
+    assert!((world.gap(column, above) - 0.05).abs() < 1e-6, "{}", world.gap(column, above));
+    assert!((world.gap(column, beside) - 0.05).abs() < 1e-6, "{}", world.gap(column, beside));
+    // Lying along x it reaches the ball beside it, and no longer the one above.
+    let lying = UnitQuaternion::from_axis_angle(&nalgebra::Vector3::y_axis(), std::f64::consts::FRAC_PI_2);
+    world.place(column, &turned(lying));
+    world.step();
+    assert!((world.gap(column, above) - 0.45).abs() < 1e-6, "{}", world.gap(column, above));
+    assert!((world.gap(column, beside) - 0.15).abs() < 1e-6, "{}", world.gap(column, beside));
+}

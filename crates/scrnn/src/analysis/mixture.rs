@@ -126,12 +126,6 @@ impl GaussianMixture {
         Ok(mixture)
     }
 
-    /// Number of components.
-    #[must_use]
-    pub fn components(&self) -> usize {
-        self.components.len()
-    }
-
     /// ln p(z) of a point.
     ///
     /// # Errors

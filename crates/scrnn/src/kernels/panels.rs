@@ -83,12 +83,6 @@ impl Panels {
     pub fn rows(&self) -> usize {
         self.rows
     }
-
-    /// Terms of each sum.
-    #[must_use]
-    pub fn inner(&self) -> usize {
-        self.inner
-    }
 }
 
 /// Columns of a factor: column `c` is `values[c * stride..][..inner]`.

@@ -221,12 +221,6 @@ impl Learner {
         self.guard.as_ref().map_or(0, |guard| guard.recoveries)
     }
 
-    /// The plan.
-    #[must_use]
-    pub fn plan(&self) -> &Plan {
-        &self.plan
-    }
-
     /// The optimiser's memory.
     #[must_use]
     pub fn optimiser_state(&self) -> OptimiserState {
@@ -235,12 +229,6 @@ impl Learner {
             guard.save(&mut state);
         }
         state
-    }
-
-    /// ln L_out of each sequence at the last evaluation, in nats; -E without variance units.
-    #[must_use]
-    pub fn ln_likelihoods(&self) -> &[f64] {
-        &self.objective.ln_likelihood
     }
 
     /// Learns to the end of the plan, or until the observer stops it.
