@@ -4,7 +4,7 @@ use scrnn::dataset::{Dataset, Sequence};
 use scrnn::engine::{Engine, InstructionSet};
 use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions};
 use scrnn::initialization::initialize;
-use scrnn::learning::{Control, EpochReport, Learner, Plan};
+use scrnn::learning::{Adam, Control, EpochReport, Learner, Momentum, Optimiser, Plan};
 use scrnn::topology::{Group, Prediction, Topology};
 
 fn wave(steps: usize) -> Vec<f64> {
@@ -34,9 +34,14 @@ fn after_the_first_epochs_an_epoch_allocates_nothing() {
     let sequences = [30, 45, 12].map(|steps| Sequence::new("", 2, wave(steps)).unwrap());
     let data = Dataset::new(Dataset::numbered_channels(2), sequences.to_vec()).unwrap();
     let topology = Topology::s_ctrnn(2, 13, 2.0).unwrap();
-    for recompute in [false, true] {
+    let in_batches = Optimiser::Adam(Adam { batch_size: 2, ..Adam::default() });
+    for (recompute, optimiser) in [
+        (false, Optimiser::Momentum(Momentum::default())),
+        (true, Optimiser::Momentum(Momentum::default())),
+        (false, in_batches),
+    ] {
         let (network, states) = initialize(&topology, 3, 1);
-        let plan = Plan { epochs: 20, recompute, ..Plan::default() };
+        let plan = Plan { epochs: 20, recompute, optimiser: optimiser.clone(), ..Plan::default() };
         let mut learner = Learner::new(network, states, &data, plan, &Engine::serial()).unwrap();
         // Counting begins and ends inside of the training, where the observer stands.
         let mut epochs = 0;
@@ -50,6 +55,6 @@ fn after_the_first_epochs_an_epoch_allocates_nothing() {
                 if epochs < 15 { Control::Continue } else { Control::Stop }
             });
         });
-        assert_eq!((epochs, counted.count_total), (15, 0), "recompute {recompute}");
+        assert_eq!((epochs, counted.count_total), (15, 0), "{optimiser:?}, recompute {recompute}");
     }
 }

@@ -202,7 +202,7 @@ pub struct Group {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Training {
-    /// Number of updates. Each one sees all sequences.
+    /// How often all sequences are seen. Each time is one update, but for Adam in batches.
     pub epochs: u64,
     /// The rule of ascent. Only the table of the same name is used.
     pub optimiser: OptimiserName,
@@ -296,6 +296,8 @@ pub struct Adam {
     pub clip_norm: f64,
     /// Every update takes this times the rate off each weight; biases keep theirs.
     pub weight_decay: f64,
+    /// Sequences that an update learns from; 0 takes all. An epoch makes as many updates as it takes to meet every sequence once.
+    pub batch_size: usize,
     /// Initial states learn at this many times the rate.
     pub initial_state_factor: f64,
     /// Their mean learns at this many times the rate.

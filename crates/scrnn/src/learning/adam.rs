@@ -10,6 +10,8 @@
 //! (s / sigma_IS)^2 z, and moving the mean moves all u_0 with it, so its gradient has no prior term: neither is stiff,
 //! however narrow the prior.
 
+use std::ops::Range;
+
 use super::plan::Adam;
 use super::state::Fields;
 use crate::initial_states::InitialStates;
@@ -30,14 +32,40 @@ impl Moments {
 
     /// Moves `values` along `gradient`; `update` is the number of this update, from 1.
     fn ascend(&mut self, adam: &Adam, update: u64, rate: f64, gradient: &[f64], values: &mut [f64]) {
+        self.ascend_range(0..values.len(), adam, update, rate, gradient, values);
+    }
+
+    /// The same for values that are only a part of the list.
+    fn ascend_range(
+        &mut self,
+        part: Range<usize>,
+        adam: &Adam,
+        update: u64,
+        rate: f64,
+        gradient: &[f64],
+        values: &mut [f64],
+    ) {
         let power = |beta: f64| 1.0 - beta.powf(update as f64);
         let (correct_first, correct_second) = (1.0 / power(adam.beta1), 1.0 / power(adam.beta2));
-        for (((value, g), m), q) in values.iter_mut().zip(gradient).zip(&mut self.first).zip(&mut self.second) {
+        let moments = self.first[part.clone()].iter_mut().zip(&mut self.second[part]);
+        for ((value, g), (m, q)) in values.iter_mut().zip(gradient).zip(moments) {
             *m = adam.beta1 * *m + (1.0 - adam.beta1) * g;
             *q = adam.beta2 * *q + (1.0 - adam.beta2) * (g * g);
             *value += rate * (*m * correct_first) / ((*q * correct_second).sqrt() + adam.epsilon);
         }
     }
+}
+
+/// The sequences that an update learns from.
+#[derive(Debug)]
+pub(super) struct Batch<'a> {
+    /// The epoch, from 0.
+    pub epoch: u64,
+    /// The number of this update, from 1.
+    pub update: u64,
+    pub sequences: &'a [usize],
+    /// Their steps times the channels.
+    pub terms: f64,
 }
 
 /// What the rule remembers.
@@ -50,8 +78,8 @@ pub(super) struct AdamRule {
     initial: Moments,
     mean: Moments,
     epochs: u64,
-    /// T_total N_O, and the average of T N_O over sequences.
-    terms: (f64, f64),
+    /// The average of T N_O over sequences.
+    terms: f64,
     /// s, and (s / sigma_IS)^2.
     spread: (f64, f64),
     learns: Vec<bool>,
@@ -78,7 +106,7 @@ impl AdamRule {
             initial: Moments::new(states.values().len()),
             mean: Moments::new(states.mean().len()),
             epochs,
-            terms: (terms, terms / states.sequences() as f64),
+            terms: terms / states.sequences() as f64,
             spread: (s, s * s / variance),
             learns: topology.per_unit(|group| group.learns_initial_state).collect(),
             scratch: vec![0.0; parameters.max(states.values().len())],
@@ -109,23 +137,23 @@ impl AdamRule {
         (rate, rate * self.options.initial_state_factor)
     }
 
-    /// One update from the gradients of ln L_out.
+    /// One update from the gradients of ln L_out over a batch of sequences. Initial states of others stay as they are.
     pub fn ascend(
         &mut self,
-        epoch: u64,
+        batch: &Batch<'_>,
         gradients: &Gradients,
         initial: &[f64],
         parameters: &mut Parameters,
         states: &mut InitialStates,
     ) {
         let adam = self.options.clone();
-        let (update, rate) = (epoch + 1, self.rate(epoch));
+        let rate = self.rate(batch.epoch);
 
-        let norm = gradients.as_slice().iter().map(|g| g * g).sum::<f64>().sqrt() / self.terms.0;
+        let norm = gradients.as_slice().iter().map(|g| g * g).sum::<f64>().sqrt() / batch.terms;
         let clip = if adam.clip_norm > 0.0 && norm > adam.clip_norm { adam.clip_norm / norm } else { 1.0 };
         let scratch = &mut self.scratch[..gradients.as_slice().len()];
         for (out, g) in scratch.iter_mut().zip(gradients.as_slice()) {
-            *out = g * (clip / self.terms.0);
+            *out = g * (clip / batch.terms);
         }
         if adam.weight_decay > 0.0 {
             let keep = 1.0 - (rate * adam.weight_decay).min(1.0);
@@ -133,23 +161,31 @@ impl AdamRule {
                 parameters.block_mut(block).iter_mut().for_each(|w| *w *= keep);
             }
         }
-        self.shared.ascend(&adam, update, rate, scratch, parameters.as_mut_slice());
+        self.shared.ascend(&adam, batch.update, rate, scratch, parameters.as_mut_slice());
 
         let units = self.learns.len();
         let (s, pull) = self.spread;
-        let scratch = &mut self.scratch[..initial.len()];
-        for (index, (out, g)) in scratch.iter_mut().zip(initial).enumerate() {
+        // Each sequence is met once an epoch.
+        let (met, own_rate) = (batch.epoch + 1, rate * adam.initial_state_factor);
+        for (index, z) in self.z.iter_mut().enumerate() {
             let i = index % units;
-            self.z[index] = if self.learns[i] { (states.values()[index] - states.mean()[i]) / s } else { 0.0 };
-            *out = if self.learns[i] { (s * g - pull * self.z[index]) / self.terms.1 } else { 0.0 };
+            *z = if self.learns[i] { (states.values()[index] - states.mean()[i]) / s } else { 0.0 };
         }
-        self.initial.ascend(&adam, update, rate * adam.initial_state_factor, scratch, &mut self.z);
+        for (&sequence, initial) in batch.sequences.iter().zip(initial.chunks_exact(units)) {
+            let own = sequence * units..(sequence + 1) * units;
+            let z = &mut self.z[own.clone()];
+            let scratch = &mut self.scratch[..units];
+            for (i, (out, g)) in scratch.iter_mut().zip(initial).enumerate() {
+                *out = if self.learns[i] { (s * g - pull * z[i]) / self.terms } else { 0.0 };
+            }
+            self.initial.ascend_range(own, &adam, met, own_rate, scratch, z);
+        }
 
         let scratch = &mut self.scratch[..units];
         for (i, out) in scratch.iter_mut().enumerate() {
-            *out = initial.iter().skip(i).step_by(units).sum::<f64>() / self.terms.0;
+            *out = initial.iter().skip(i).step_by(units).sum::<f64>() / batch.terms;
         }
-        self.mean.ascend(&adam, update, rate * adam.mean_factor, scratch, states.mean_mut());
+        self.mean.ascend(&adam, batch.update, rate * adam.mean_factor, scratch, states.mean_mut());
         for (index, z) in self.z.iter().enumerate() {
             let i = index % units;
             if self.learns[i] {
@@ -200,10 +236,29 @@ mod tests {
         let mut rule = AdamRule::new(options, &topology, &states, 10, 1.0, 10);
         // Without a gradient nothing else moves.
         let (gradients, initial) = (Parameters::zeros(&topology), [0.0; 3]);
-        rule.ascend(0, &gradients, &initial, &mut network.parameters, &mut states);
+        let batch = Batch { epoch: 0, update: 1, sequences: &[0], terms: 20.0 };
+        rule.ascend(&batch, &gradients, &initial, &mut network.parameters, &mut states);
         for block in Block::ALL {
             let expected = if block.is_bias() { 0.5 } else { 0.5 * 0.98 };
             assert!(network.parameters.block(block).iter().all(|w| (w - expected).abs() < 1e-15), "{block:?}");
+        }
+    }
+
+    #[test]
+    fn an_update_moves_only_the_initial_states_of_its_batch() {
+        let topology = Topology::s_ctrnn(1, 2, 2.0).unwrap();
+        let (mut network, mut states) = crate::initialization::initialize(&topology, 3, 5);
+        let options = Adam { rate: 0.1, warm_up: 0.0, mean_factor: 0.0, ..Adam::default() };
+        let mut rule = AdamRule::new(options, &topology, &states, 10, 1.0, 10);
+        let (gradients, before) = (Parameters::zeros(&topology), states.clone());
+        let batch = Batch { epoch: 0, update: 1, sequences: &[2, 0], terms: 20.0 };
+        rule.ascend(&batch, &gradients, &[1.0, 2.0, -1.0, 5.0], &mut network.parameters, &mut states);
+        let moved = |s: usize| [0, 1].map(|i| states.sequence(s)[i] - before.sequence(s)[i]);
+        // The first step of Adam is as long as the rate, three times that of the weights, whatever the gradient.
+        for (sequence, expected) in [(0, [-0.3, 0.3]), (1, [0.0, 0.0]), (2, [0.3, 0.3])] {
+            for (moved, expected) in moved(sequence).into_iter().zip(expected) {
+                assert!((moved - expected).abs() < 1e-6, "{sequence}: {moved} instead of {expected}");
+            }
         }
     }
 

@@ -1,6 +1,7 @@
 //! The loop of learning: evaluate, report, ascend.
 
 use super::adam::AdamRule;
+use super::batches::Batches;
 use super::divergence::Divergence;
 use super::guard::{self, Guard, Recovery};
 use super::momentum::MomentumRule;
@@ -13,7 +14,6 @@ use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::initial_states::InitialStates;
 use crate::network::Network;
-use crate::objective::{Objective, Want};
 
 /// Whether to go on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -131,8 +131,8 @@ pub struct Learner {
     plan: Plan,
     data: Dataset,
     terms: f64,
-    objective: Objective,
-    /// Whether the objective already holds the values of the present state.
+    batches: Batches,
+    /// Whether `batches` already holds what the next report says.
     evaluated: bool,
 }
 
@@ -173,12 +173,16 @@ impl Learner {
                 Rule::Adam(AdamRule::new(options, topology, &initial_states, total, variance, plan.epochs))
             }
         };
-        let objective = Objective::new(topology, &items, plan.recompute, engine);
+        let batch_size = match &plan.optimiser {
+            Optimiser::Adam(adam) if adam.batch_size > 0 => adam.batch_size,
+            _ => sequences,
+        };
+        let batches = Batches::new(topology, &items, batch_size, plan.recompute, engine);
         let terms = (total * topology.channels()) as f64;
         let state = State { network, initial_states, rule, epoch: 0 };
         let guard = (plan.on_divergence == OnDivergence::Recover).then(|| Guard::new(&state));
         let last_good = state.clone();
-        Ok(Self { last_good, state, guard, plan, data: data.clone(), terms, objective, evaluated: false })
+        Ok(Self { last_good, state, guard, plan, data: data.clone(), terms, batches, evaluated: false })
     }
 
     /// Goes on from a checkpoint, of which `new` got the network and the initial states.
@@ -193,7 +197,7 @@ impl Learner {
             guard.load(state)?;
             self.state.rule.slow_down(guard.rate_factor());
         }
-        self.evaluated = false;
+        self.evaluated = self.batches.load(state)?;
         Ok(())
     }
 
@@ -228,6 +232,7 @@ impl Learner {
         if let Some(guard) = &self.guard {
             guard.save(&mut state);
         }
+        self.batches.save(&mut state);
         state
     }
 
@@ -247,7 +252,7 @@ impl Learner {
             }
             self.last_good.copy_from(&self.state);
             if let Some(guard) = &mut self.guard {
-                guard.compare(&self.state, self.objective.ln_likelihood.iter().sum());
+                guard.compare(&self.state, self.batches.ln_likelihood());
             }
             let control = observer.epoch(&self.report(), self);
             if self.state.epoch >= self.plan.epochs {
@@ -263,8 +268,7 @@ impl Learner {
 
     fn evaluate(&mut self) {
         if !self.evaluated {
-            self.objective.set_parameters(&self.state.network.parameters);
-            self.objective.evaluate(self.state.initial_states.values(), Want::Everything);
+            self.batches.evaluate(&self.state.network.parameters, &self.state.initial_states);
             self.evaluated = true;
         }
     }
@@ -284,18 +288,12 @@ impl Learner {
 
     fn divergence(&self) -> Option<Divergence> {
         let State { network, initial_states, epoch, .. } = &self.state;
-        let finite =
-            |s: usize| self.objective.ln_likelihood[s].is_finite() && self.objective.squared_error[s].is_finite();
-        let mut divergence = if let Some(s) = (0..self.objective.ln_likelihood.len()).find(|&s| !finite(s)) {
+        let mut divergence = if let Some(s) = self.batches.sequence_without_numbers() {
             Divergence::in_sequence(*epoch, network, initial_states, &self.data, s)
+        } else if let Some(gradients) = self.batches.gradient_without_numbers() {
+            Divergence::in_gradient(*epoch, gradients)
         } else {
-            let gradients = &self.objective.gradients;
-            let all = gradients.as_slice().iter().chain(&self.objective.initial);
-            if all.into_iter().all(|g| g.is_finite()) {
-                Divergence::of_likelihood(*epoch, self.least_likely(), self.rise()?)
-            } else {
-                Divergence::in_gradient(*epoch, gradients)
-            }
+            Divergence::of_likelihood(*epoch, self.least_likely(), self.rise()?)
         };
         divergence.rolled_back_to = self.guard.as_ref().map_or(self.last_good.epoch, |guard| guard.safe.epoch);
         Some(divergence)
@@ -303,21 +301,20 @@ impl Learner {
 
     /// How far the nll rose above its best, where the guard objects to it.
     fn rise(&self) -> Option<f64> {
-        self.guard.as_ref()?.rise(self.objective.ln_likelihood.iter().sum(), self.terms)
+        self.guard.as_ref()?.rise(self.batches.ln_likelihood(), self.terms)
     }
 
     /// The sequence of the lowest likelihood a step.
     fn least_likely(&self) -> usize {
         let delay = self.state.network.topology.delay();
         let steps = self.data.sequences().iter().map(|sequence| (sequence.len() - delay) as f64);
-        let each = self.objective.ln_likelihood.iter().zip(steps).map(|(ln_likelihood, steps)| ln_likelihood / steps);
+        let each = self.batches.ln_likelihoods.iter().zip(steps).map(|(ln_likelihood, steps)| ln_likelihood / steps);
         each.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(s, _)| s)
     }
 
     fn report(&self) -> EpochReport {
         let topology = &self.state.network.topology;
-        let ln_likelihood: f64 = self.objective.ln_likelihood.iter().sum();
-        let norm = self.objective.gradients.as_slice().iter().map(|g| g * g).sum::<f64>().sqrt();
+        let ln_likelihood = self.batches.ln_likelihood();
         let (rate_shared, rate_initial) = match &self.state.rule {
             Rule::Momentum(rule) => rule.rates(),
             Rule::Adam(rule) => rule.rates(self.state.epoch),
@@ -326,25 +323,29 @@ impl Learner {
             epoch: self.state.epoch,
             ln_likelihood,
             nll: topology.has_variance().then_some(-ln_likelihood / self.terms),
-            mse: self.objective.squared_error.iter().sum::<f64>() / self.terms,
+            mse: self.batches.squared_error() / self.terms,
             ln_prior: self.state.initial_states.ln_prior(topology, self.plan.initial_state_variance),
             rate_shared,
             rate_initial,
-            gradient_norm: norm / self.terms,
+            gradient_norm: self.batches.gradient_norm,
             recoveries: self.recoveries(),
         }
     }
 
     fn update(&mut self) {
         let State { network, initial_states, rule, epoch } = &mut self.state;
-        let (gradients, initial) = (&self.objective.gradients, &self.objective.initial);
-        let (topology, parameters) = (&network.topology, &mut network.parameters);
         self.evaluated = false;
         match rule {
-            Rule::Adam(rule) => rule.ascend(*epoch, gradients, initial, parameters, initial_states),
+            Rule::Adam(rule) => {
+                let last = *epoch + 1 == self.plan.epochs;
+                let state = (&mut network.parameters, initial_states);
+                // After several updates the values that they began from stand for the epoch, but for the last.
+                self.evaluated = self.batches.ascend(rule, *epoch, state) && !last;
+            }
             Rule::Momentum(rule) => {
-                rule.accumulate(topology, gradients, initial, initial_states);
-                rule.apply(parameters, initial_states);
+                let (gradients, initial) = self.batches.gradient_of_all();
+                rule.accumulate(&network.topology, gradients, initial, initial_states);
+                rule.apply(&mut network.parameters, initial_states);
                 if rule.options.adaptive.is_some() {
                     self.adapt();
                 }
@@ -355,13 +356,13 @@ impl Learner {
     /// Accepts the tentative update, or withdraws it and tries a lower rate (D.1). The last good state holds the
     /// parameters before the update.
     fn adapt(&mut self) {
-        let before: f64 = self.objective.squared_error.iter().sum();
+        let before = self.batches.squared_error();
         let Rule::Momentum(rule) = &self.state.rule else { return };
         let Some(options) = rule.options.adaptive.clone() else { return };
         for _ in 1..options.max_tries {
             self.evaluated = false;
             self.evaluate();
-            let ratio = self.objective.squared_error.iter().sum::<f64>() / before;
+            let ratio = self.batches.squared_error() / before;
             let State { network, initial_states, rule: Rule::Momentum(rule), .. } = &mut self.state else { return };
             if ratio <= options.max_error_ratio {
                 if ratio < 1.0 {

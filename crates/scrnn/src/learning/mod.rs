@@ -3,6 +3,7 @@
 //! Shared parameters ascend ln L_out, initial states and their mean ln L_all = ln L_out + ln L_init.
 
 mod adam;
+mod batches;
 mod divergence;
 mod guard;
 mod learner;

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 /// A training.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// Number of updates.
+    /// Passes through the data; each is one update, but for Adam in batches.
     pub epochs: u64,
     /// sigma^2_IS, the variance of the initial states around their mean (2.13).
     pub initial_state_variance: f64,
@@ -112,6 +112,9 @@ pub struct Adam {
     /// Share of every weight that a rate of 1 would take away at each update, biases aside (decoupled, Loshchilov and
     /// Hutter, 2019): smooth networks for short data.
     pub weight_decay: f64,
+    /// Sequences of an update; 0 takes all. With fewer than all, the sequences are dealt into groups of about this size, and an
+    /// epoch makes an update for each group.
+    pub batch_size: usize,
     /// Factor on the rate for initial states.
     pub initial_state_factor: f64,
     /// Factor on the rate for their mean.
@@ -132,6 +135,7 @@ impl Default for Adam {
             final_rate: 0.0,
             clip_norm: 1.0,
             weight_decay: 0.0,
+            batch_size: 0,
             initial_state_factor: 3.0,
             mean_factor: 3.0,
             beta1: 0.9,

@@ -29,6 +29,12 @@ fn adam(epochs: u64) -> Plan {
     Plan { epochs, optimiser: Optimiser::Adam(Adam { rate: 0.01, ..Adam::default() }), ..Plan::default() }
 }
 
+/// Adam that learns from one or two of the three sequences at a time.
+fn batches(epochs: u64) -> Plan {
+    let options = Adam { rate: 0.01, batch_size: 2, ..Adam::default() };
+    Plan { epochs, optimiser: Optimiser::Adam(options), ..Plan::default() }
+}
+
 /// Runs, and returns the objective of every epoch.
 fn run(learner: &mut Learner) -> (Outcome, Vec<f64>) {
     let mut history = Vec::new();
@@ -48,7 +54,7 @@ fn bits(learner: &Learner) -> Vec<u64> {
 #[test]
 fn every_optimiser_ascends() {
     let adaptive = Momentum { adaptive: Some(AdaptiveRate::default()), ..Momentum::default() };
-    for plan in [momentum(4000, Momentum::default()), momentum(800, adaptive), adam(800)] {
+    for plan in [momentum(4000, Momentum::default()), momentum(800, adaptive), adam(800), batches(500)] {
         let mut learner = learner(plan.clone(), 1);
         let (outcome, history) = run(&mut learner);
         assert_eq!((outcome, history.len() as u64), (Outcome::Finished, plan.epochs + 1));
@@ -79,7 +85,7 @@ fn a_learner_without_variance_lowers_the_squared_error() {
 fn stopping_and_restoring_goes_on_bit_for_bit() {
     let adaptive = Momentum { adaptive: Some(AdaptiveRate::default()), ..Momentum::default() };
     let narrow = Plan { initial_state_variance: 1e-5, ..momentum(60, Momentum::default()) };
-    for plan in [momentum(60, Momentum::default()), momentum(60, adaptive), adam(60), narrow] {
+    for plan in [momentum(60, Momentum::default()), momentum(60, adaptive), adam(60), batches(60), narrow] {
         let mut whole = learner(plan.clone(), 1);
         run(&mut whole);
 
@@ -104,15 +110,62 @@ fn stopping_and_restoring_goes_on_bit_for_bit() {
 fn any_number_of_threads_learns_the_same_bits() {
     let data = waves(14, 80);
     let topology = Topology::s_ctrnn(1, 8, 2.0).unwrap();
-    let learn = |threads: usize| {
+    let learn = |threads: usize, batch_size: usize| {
         let (network, states) = initialize(&topology, 14, 5);
         let engine = Engine::new(threads, InstructionSet::best()).unwrap();
-        let mut learner = Learner::new(network, states, &data, adam(40), &engine).unwrap();
+        let plan = Plan { optimiser: Optimiser::Adam(Adam { batch_size, ..Adam::default() }), ..adam(40) };
+        let mut learner = Learner::new(network, states, &data, plan, &engine).unwrap();
         run(&mut learner);
         bits(&learner)
     };
-    let one = learn(1);
-    assert!(learn(2) == one && learn(4) == one);
+    for batch_size in [0, 8, 3] {
+        let one = learn(1, batch_size);
+        assert!(learn(2, batch_size) == one && learn(4, batch_size) == one);
+    }
+    // One batch of all is no batch.
+    assert!(learn(1, 0) == learn(1, 14) && learn(1, 0) == learn(1, 1000) && learn(1, 0) != learn(1, 13));
+}
+
+#[test]
+fn a_training_in_batches_evaluates_all_at_both_ends() {
+    let mut trained = learner(batches(7), 1);
+    let mut watch = Watch::default();
+    assert_eq!(trained.run(&mut watch), Outcome::Finished);
+    assert_eq!(watch.reports.len(), 8);
+    let evaluated = |network, states| {
+        let mut learner = Learner::new(network, states, &waves(3, 60), adam(0), &Engine::serial()).unwrap();
+        let mut watch = Watch::default();
+        learner.run(&mut watch);
+        watch.reports.remove(0)
+    };
+    let near = |a: &EpochReport, b: &EpochReport| {
+        for (a, b) in [(a.ln_likelihood, b.ln_likelihood), (a.mse, b.mse), (a.gradient_norm, b.gradient_norm)] {
+            assert!((a - b).abs() < 1e-9 * b.abs(), "{a} and {b}");
+        }
+    };
+    let first = initialize(&trained.network().topology, 3, 5);
+    near(&watch.reports[0], &evaluated(first.0, first.1));
+    near(&watch.reports[7], &evaluated(trained.network().clone(), trained.initial_states().clone()));
+}
+
+#[test]
+fn values_that_end_in_the_middle_of_an_epoch_are_rolled_back_to_its_beginning() {
+    // The first update throws all weights out of the numbers, the second one cannot be made.
+    let options = Adam { rate: 1e300, batch_size: 1, warm_up: 0.0, clip_norm: 0.0, ..Adam::default() };
+    let plan = Plan { optimiser: Optimiser::Adam(options), ..adam(20) };
+    let mut stopping = learner(plan.clone(), 1);
+    let good = bits(&stopping);
+    let Outcome::Diverged(divergence) = run(&mut stopping).0 else { panic!("it did not diverge") };
+    assert_eq!((divergence.epoch, divergence.rolled_back_to, stopping.epoch()), (1, 0, 0));
+    assert!(bits(&stopping) == good);
+
+    // A rate that twenty halvings can mend.
+    let options = Adam { rate: 1e3, batch_size: 1, clip_norm: 0.0, ..Adam::default() };
+    let mut brought_back = learner(guarded(300, Optimiser::Adam(options)), 1);
+    let mut watch = Watch::default();
+    assert_eq!(brought_back.run(&mut watch), Outcome::Finished);
+    assert!(!watch.recoveries.is_empty());
+    assert!(watch.reports.iter().all(|report| report.ln_likelihood.is_finite()));
 }
 
 #[test]
@@ -230,7 +283,7 @@ fn a_training_that_leaves_its_course_is_brought_back_and_ends_well() {
 
 #[test]
 fn a_guard_that_is_not_needed_changes_no_bit() {
-    for plan in [momentum(200, Momentum::default()), adam(200)] {
+    for plan in [momentum(200, Momentum::default()), adam(200), batches(200)] {
         let [mut with, mut without] = [OnDivergence::Recover, OnDivergence::Stop]
             .map(|on_divergence| learner(Plan { on_divergence, ..plan.clone() }, 1));
         assert_eq!(run(&mut with), run(&mut without));
@@ -243,6 +296,7 @@ fn a_guarded_training_that_is_stopped_anywhere_goes_on_bit_for_bit() {
     for optimiser in [
         Optimiser::Momentum(Momentum { rate: 0.3, ..Momentum::default() }),
         Optimiser::Adam(Adam { rate: 3.0, clip_norm: 0.0, ..Adam::default() }),
+        Optimiser::Adam(Adam { rate: 1e3, clip_norm: 0.0, batch_size: 1, ..Adam::default() }),
     ] {
         let plan = guarded(400, optimiser);
         let mut whole = learner(plan.clone(), 1);
