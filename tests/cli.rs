@@ -51,6 +51,13 @@ fn sine_with_adam() -> String {
     SINE.replace("optimiser = \"momentum\"", "optimiser = \"adam\"").replace("[training.momentum]", "[training.adam]")
 }
 
+/// The same with three sequences, one in each update.
+fn sine_in_batches() -> String {
+    sine_with_adam()
+        .replace("steps = 80", "steps = 60\nsequences = 3")
+        .replace("[training.adam]", "[training.adam]\nbatch_size = 1")
+}
+
 /// A folder to work in; all paths of a command line are relative to it.
 struct Place(tempfile::TempDir);
 

@@ -3,7 +3,7 @@
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::{Place, SINE, epochs, sine_with_adam};
+use crate::{Place, SINE, epochs, sine_in_batches, sine_with_adam};
 
 /// The files that must come out the same.
 const RESULTS: [&str; 2] = ["checkpoint.safetensors", "best.safetensors"];
@@ -36,7 +36,7 @@ pub fn wait_for(place: &Place, name: &str) {
 
 #[test]
 fn a_run_that_is_killed_again_and_again_comes_to_the_same_bits() {
-    for experiment in [SINE.to_owned(), sine_with_adam()] {
+    for experiment in [SINE.to_owned(), sine_with_adam(), sine_in_batches()] {
         let place = Place::with(&experiment.replace("epochs = 120", "epochs = 6000"));
         place.ok("train sine.toml --out whole --set output.checkpoint_every=3000");
         let mut killed = 0;
