@@ -116,7 +116,7 @@ fn closed_loop(findings: &Findings, material: &Material, twelve: bool) -> Sectio
     let count = findings.patterns.len();
     blocks.push(figure(
         "closed-loop",
-        "The S-CTRNN on its own",
+        if twelve { "The S-CTRNN on its own" } else { "The network on its own" },
         &format!(
             "Closed loop with noise of the predicted variance: {} of {count} are regenerated for 1000 steps. A cross marks \
              failure.",

@@ -162,7 +162,7 @@ fn reproduce<S: Study>(study: &S, arguments: &Arguments, shared: &Shared) -> Res
             let changed = if index == 0 { arguments.set.as_slice() } else { &[] };
             let experiment = kind.experiment(arguments.preset, seed, arguments.epochs, changed)?;
             let run = format!("seed-{seed}{}", kind.suffix);
-            let label = format!("seed {seed}, {}: ", kind.name);
+            let label = format!("seed {seed}, {}: ", kind.called(&experiment));
             let progress = Progress::labelled(&label, experiment.training.epochs, shared.quiet, &bars);
             let found = if arguments.overwrite { Found::Overwrite } else { Found::GoOn };
             let place = path.join(&run);
@@ -229,9 +229,10 @@ fn reproduce<S: Study>(study: &S, arguments: &Arguments, shared: &Shared) -> Res
 fn learned(kind: &Kind, folder: String, experiment: Experiment, training: Training, place: &Path) -> Result<Learned> {
     let Network { topology, parameters } = training.learner.network();
     let network = Network { topology: topology.clone(), parameters: parameters.clone() };
-    let facts = TrainingFacts::of(kind.name, &folder, &training);
+    let name = kind.called(&experiment);
+    let facts = TrainingFacts::of(name, &folder, &training);
     Ok(Learned {
-        name: kind.name,
+        name,
         experiment,
         network,
         initial_states: training.learner.initial_states().clone(),

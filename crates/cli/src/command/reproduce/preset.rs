@@ -45,7 +45,7 @@ pub const LISSAJOUS_CTRNN: Kind = Kind {
     suffix: "-ctrnn",
     presets: [asset!("lissajous_ctrnn.toml"), asset!("lissajous_ctrnn_fast.toml")],
 };
-/// The S-CTRNN of 144 patterns.
+/// The S-CTRNN of 144 patterns; in the fast preset it has two time constants.
 pub const PATTERNS: Kind =
     Kind { name: "S-CTRNN", suffix: "", presets: [asset!("patterns.toml"), asset!("patterns_fast.toml")] };
 /// The S-CTRNN of the sine wave.
@@ -78,6 +78,12 @@ pub const INTERACTION_WIDE: Kind = Kind {
 };
 
 impl Kind {
+    /// What the thesis calls the network of `experiment`: one with several time constants is an MTRNN.
+    pub fn called(&self, experiment: &Experiment) -> &'static str {
+        let several = experiment.network.groups.windows(2).any(|pair| pair[0].time_constant != pair[1].time_constant);
+        if several && self.name == "S-CTRNN" { "S-MTRNN" } else { self.name }
+    }
+
     /// The resolved experiment with some of its keys changed. `seed` is that of the weights and of the data's noise alike.
     pub fn experiment(
         &self,
@@ -126,6 +132,15 @@ mod tests {
                 assert_eq!(experiment.network.variance, kind.name == "S-CTRNN");
             }
         }
+    }
+
+    #[test]
+    fn a_network_of_several_time_constants_is_called_an_mtrnn() {
+        let called = |kind: Kind, preset| kind.called(&kind.experiment(preset, 1, None, &[]).unwrap());
+        assert_eq!(called(PATTERNS, Preset::Thesis), "S-CTRNN");
+        assert_eq!(called(PATTERNS, Preset::Fast), "S-MTRNN");
+        assert_eq!(called(LISSAJOUS_CTRNN, Preset::Fast), "CTRNN");
+        assert_eq!(called(INTERACTION_WIDE, Preset::Fast), "S-MTRNN");
     }
 
     #[test]

@@ -41,7 +41,7 @@ pub trait Study: Sync {
 /// A trained network with what it learned from.
 #[derive(Debug)]
 pub struct Learned {
-    /// CTRNN or S-CTRNN.
+    /// CTRNN, S-CTRNN or S-MTRNN.
     pub name: &'static str,
     /// Its experiment, with every value explicit.
     pub experiment: Experiment,
@@ -67,7 +67,7 @@ impl Learned {
 /// A training in numbers.
 #[derive(Debug, Clone, Serialize)]
 pub struct TrainingFacts {
-    /// CTRNN or S-CTRNN.
+    /// CTRNN, S-CTRNN or S-MTRNN.
     pub network: &'static str,
     /// The run folder, beside metrics.json.
     pub folder: String,
