@@ -27,9 +27,10 @@ pub enum Control {
 /// What the evaluation of an epoch found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EpochReport {
-    /// Updates made so far; 0 is the initial network.
+    /// Epochs done so far; 0 is the initial network.
     pub epoch: u64,
-    /// ln L_out in nats over all sequences (2.11); without variance units -E (A.22).
+    /// ln L_out in nats over all sequences (2.11); without variance units -E (A.22). In batches, each was evaluated at the parameters
+    /// that it met, but for the first report and the last.
     pub ln_likelihood: f64,
     /// -ln L_out in nats per step and channel, in the network's units; none without variance units.
     pub nll: Option<f64>,
@@ -41,7 +42,7 @@ pub struct EpochReport {
     pub rate_shared: f64,
     /// The rate for initial states.
     pub rate_initial: f64,
-    /// Length of the gradient of ln L_out per step and channel in the shared parameters.
+    /// Length of the gradient of ln L_out per step and channel in the shared parameters; in batches, of the last one.
     pub gradient_norm: f64,
     /// How often the training was brought back so far.
     pub recoveries: u64,
@@ -49,8 +50,8 @@ pub struct EpochReport {
 
 /// Watches a training, and can stop it.
 pub trait Observer {
-    /// Called after each evaluation, before the update. A run of N epochs makes N + 1 calls, the last with the final
-    /// parameters. `learner` holds what was evaluated: saved here and restored later, a training goes on bit for bit.
+    /// Called before each epoch, and after the last: a run of N epochs makes N + 1 calls. `learner` holds what was evaluated (in
+    /// batches, what came out of it): saved here and restored later, a training goes on bit for bit.
     fn epoch(&mut self, report: &EpochReport, learner: &Learner) -> Control;
 
     /// Called when a training that left its course was brought back, before it goes on.
@@ -213,7 +214,7 @@ impl Learner {
         &self.state.initial_states
     }
 
-    /// Updates made so far.
+    /// Epochs done so far.
     #[must_use]
     pub fn epoch(&self) -> u64 {
         self.state.epoch
@@ -232,7 +233,9 @@ impl Learner {
         if let Some(guard) = &self.guard {
             guard.save(&mut state);
         }
-        self.batches.save(&mut state);
+        if self.evaluated {
+            self.batches.save(&mut state);
+        }
         state
     }
 

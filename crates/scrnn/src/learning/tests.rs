@@ -155,9 +155,14 @@ fn values_that_end_in_the_middle_of_an_epoch_are_rolled_back_to_its_beginning() 
     let plan = Plan { optimiser: Optimiser::Adam(options), ..adam(20) };
     let mut stopping = learner(plan.clone(), 1);
     let good = bits(&stopping);
-    let Outcome::Diverged(divergence) = run(&mut stopping).0 else { panic!("it did not diverge") };
+    let (Outcome::Diverged(divergence), history) = run(&mut stopping) else { panic!("it did not diverge") };
     assert_eq!((divergence.epoch, divergence.rolled_back_to, stopping.epoch()), (1, 0, 0));
     assert!(bits(&stopping) == good);
+    // What is kept of it is sound, and leads to the same place.
+    let (network, states) = (stopping.network().clone(), stopping.initial_states().clone());
+    let mut again = Learner::new(network, states, &waves(3, 60), plan, &Engine::serial()).unwrap();
+    again.restore(0, &stopping.optimiser_state()).unwrap();
+    assert_eq!(run(&mut again), (Outcome::Diverged(divergence), vec![history[0]]));
 
     // A rate that twenty halvings can mend.
     let options = Adam { rate: 1e3, batch_size: 1, clip_norm: 0.0, ..Adam::default() };

@@ -71,7 +71,7 @@ pub struct TrainingFacts {
     pub network: &'static str,
     /// The run folder, beside metrics.json.
     pub folder: String,
-    /// Updates made.
+    /// Epochs done.
     pub epochs: u64,
     /// Nats per step and channel at the end; none without variance units.
     pub nll: Option<f64>,
