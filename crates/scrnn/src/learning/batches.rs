@@ -54,7 +54,7 @@ const SQUARED_ERRORS: &str = "batches.squared_error";
 const GRADIENT_NORM: &str = "batches.gradient_norm";
 
 impl Batches {
-    /// Deals the sequences into batches of about `size`, none of which differs from another by more than one.
+    /// Deals the sequences into batches of `size` at most, none of which differs from another by more than one.
     pub fn new(topology: &Topology, items: &[Item<'_>], size: usize, recompute: bool, engine: &Engine) -> Self {
         let count = items.len().div_ceil(size.max(1)).max(1);
         let mut dealt: Vec<usize> = (0..items.len()).collect();
@@ -142,9 +142,10 @@ impl Batches {
             let update = epoch * count as u64 + nth as u64 + 1;
             let batch = adam::Batch { epoch, update, sequences, terms: *terms };
             rule.ascend(&batch, &objective.gradients, &objective.initial, parameters, states);
-            if count > 1 {
-                self.gradient_norm = norm(&objective.gradients) / terms;
-            }
+        }
+        if count > 1 {
+            let Batch { objective, terms, .. } = &self.batches[self.order[count - 1]];
+            self.gradient_norm = objective.gradients.as_slice().iter().map(|g| g * g).sum::<f64>().sqrt() / terms;
         }
         count > 1
     }
@@ -198,10 +199,6 @@ impl Batches {
         fields.load(state)?;
         Ok(true)
     }
-}
-
-fn norm(gradients: &Gradients) -> f64 {
-    gradients.as_slice().iter().map(|g| g * g).sum::<f64>().sqrt()
 }
 
 #[cfg(test)]

@@ -112,8 +112,8 @@ pub struct Adam {
     /// Share of every weight that a rate of 1 would take away at each update, biases aside (decoupled, Loshchilov and
     /// Hutter, 2019): smooth networks for short data.
     pub weight_decay: f64,
-    /// Sequences of an update; 0 takes all. With fewer than all, the sequences are dealt into groups of about this size, and an
-    /// epoch makes an update for each group.
+    /// Sequences of an update; 0 takes all. With fewer than all, the sequences are dealt into batches of this size at most, and an
+    /// epoch makes an update for each batch.
     pub batch_size: usize,
     /// Factor on the rate for initial states.
     pub initial_state_factor: f64,
