@@ -4,7 +4,7 @@ use scrnn::dataset::{Dataset, Sequence};
 use scrnn::engine::{Engine, InstructionSet};
 use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions};
 use scrnn::initialization::initialize;
-use scrnn::learning::{Adam, Control, EpochReport, Learner, Momentum, Optimiser, Plan};
+use scrnn::learning::{Adam, Control, EpochReport, Lbfgs, Learner, Momentum, Optimiser, Plan};
 use scrnn::topology::{Group, Prediction, Topology};
 
 fn wave(steps: usize) -> Vec<f64> {
@@ -35,13 +35,18 @@ fn after_the_first_epochs_an_epoch_allocates_nothing() {
     let data = Dataset::new(Dataset::numbered_channels(2), sequences.to_vec()).unwrap();
     let topology = Topology::s_ctrnn(2, 13, 2.0).unwrap();
     let in_batches = Optimiser::Adam(Adam { batch_size: 2, ..Adam::default() });
-    for (recompute, optimiser) in [
-        (false, Optimiser::Momentum(Momentum::default())),
-        (true, Optimiser::Momentum(Momentum::default())),
-        (false, in_batches),
+    let momentum = || Optimiser::Momentum(Momentum::default());
+    for (recompute, optimiser, share) in [
+        (false, momentum(), 0.0),
+        (true, momentum(), 0.0),
+        (false, in_batches.clone(), 0.0),
+        // L-BFGS from the start, and from the tenth of twenty epochs on.
+        (false, momentum(), 1.0),
+        (false, in_batches, 0.5),
     ] {
         let (network, states) = initialize(&topology, 3, 1);
-        let plan = Plan { epochs: 20, recompute, optimiser: optimiser.clone(), ..Plan::default() };
+        let lbfgs = Some(Lbfgs { share, memory: 4 });
+        let plan = Plan { epochs: 20, recompute, optimiser: optimiser.clone(), lbfgs, ..Plan::default() };
         let mut learner = Learner::new(network, states, &data, plan, &Engine::serial()).unwrap();
         // Counting begins and ends inside of the training, where the observer stands.
         let mut epochs = 0;
@@ -55,6 +60,6 @@ fn after_the_first_epochs_an_epoch_allocates_nothing() {
                 if epochs < 15 { Control::Continue } else { Control::Stop }
             });
         });
-        assert_eq!((epochs, counted.count_total), (15, 0), "{optimiser:?}, recompute {recompute}");
+        assert_eq!((epochs, counted.count_total), (15, 0), "{optimiser:?}, recompute {recompute}, L-BFGS {share}");
     }
 }

@@ -1,6 +1,6 @@
 //! What the types of the experiment file cannot rule out. A complaint names its key, so that the reader can point at it.
 
-use super::{Adam, AdaptiveRate, Data, Experiment, Momentum, Network, Output, ScalingChoice, TaskName};
+use super::{Adam, AdaptiveRate, Data, Experiment, Lbfgs, Momentum, Network, Output, ScalingChoice, TaskName};
 
 /// A value that will not do.
 #[derive(Debug, PartialEq)]
@@ -49,6 +49,12 @@ pub fn check(experiment: &Experiment) -> Check {
     }
     if let Some(adam) = &experiment.training.adam {
         check_adam(adam)?;
+    }
+    if let Some(Lbfgs { share, memory }) = experiment.training.lbfgs {
+        let key = |key| ["training", "lbfgs", key];
+        must((0.0..=1.0).contains(&share), &key("share"), share, "a number from 0 to 1")?;
+        // Twice as many numbers as parameters for each.
+        must((1..=1000).contains(&memory), &key("memory"), memory, "a number from 1 to 1000")?;
     }
     check_output(&experiment.output)
 }

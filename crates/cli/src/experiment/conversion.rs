@@ -10,8 +10,8 @@ use scrnn::topology::{self, Prediction, Topology};
 use scrnn_sim::tutor::Tutoring;
 
 use super::{
-    Adam, AdaptiveRate, Data, Experiment, Group, Momentum, OnDivergence, OptimiserName, PriorStep, ScalingChoice,
-    ScalingConstants, ScalingName, ScalingRanges, TaskName, Training,
+    Adam, AdaptiveRate, Data, Experiment, Group, Lbfgs, Momentum, OnDivergence, OptimiserName, PriorStep,
+    ScalingChoice, ScalingConstants, ScalingName, ScalingRanges, TaskName, Training,
 };
 use crate::failure::{Failure, Result};
 use crate::files::Selection;
@@ -98,6 +98,7 @@ impl Experiment {
             epochs: training.epochs,
             initial_state_variance: self.network.initial_state_variance,
             optimiser,
+            lbfgs: training.lbfgs.as_ref().map(Into::into),
             recompute: training.recompute,
             on_divergence: match training.on_divergence {
                 OnDivergence::Recover => learning::OnDivergence::Recover,
@@ -252,6 +253,19 @@ impl Default for AdaptiveRate {
         let learning::AdaptiveRate { max_error_ratio, decrease, increase, max_tries } =
             learning::AdaptiveRate::default();
         Self { max_error_ratio, decrease, increase, max_tries }
+    }
+}
+
+impl From<&Lbfgs> for learning::Lbfgs {
+    fn from(&Lbfgs { share, memory }: &Lbfgs) -> Self {
+        Self { share, memory }
+    }
+}
+
+impl Default for Lbfgs {
+    fn default() -> Self {
+        let learning::Lbfgs { share, memory } = learning::Lbfgs::default();
+        Self { share, memory }
     }
 }
 

@@ -219,6 +219,9 @@ pub struct Training {
     /// Options of "adam".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub adam: Option<Adam>,
+    /// Lets L-BFGS make the last epochs; an empty table turns it on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lbfgs: Option<Lbfgs>,
 }
 
 /// What to do when training leaves its course.
@@ -308,6 +311,17 @@ pub struct Adam {
     pub beta2: f64,
     /// Keeps the division finite.
     pub epsilon: f64,
+}
+
+/// L-BFGS over all sequences at once, after the optimiser. Where a small network has to be exact it gets far further; it climbs to the
+/// nearest maximum. An epoch is an update, which sees all sequences 1.1 times on average.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Lbfgs {
+    /// Share of the epochs, the last ones, that are its own; 1 leaves none to the optimiser.
+    pub share: f64,
+    /// How many updates it remembers.
+    pub memory: usize,
 }
 
 /// What is written while the network learns.

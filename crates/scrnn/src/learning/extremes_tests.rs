@@ -227,8 +227,12 @@ fn any_rate_ends_in_a_network_of_numbers() {
             Optimiser::Momentum(Momentum { rate, adaptive: Some(AdaptiveRate::default()), ..Momentum::default() }),
             Optimiser::Adam(Adam { rate, ..Adam::default() }),
         ] {
-            for on_divergence in [OnDivergence::Stop, OnDivergence::Recover] {
-                let plan = Plan { epochs: 40, optimiser: optimiser.clone(), on_divergence, ..Plan::default() };
+            let with_and_without = [None, Some(Lbfgs { share: 0.5, memory: 5 })];
+            for (on_divergence, lbfgs) in [OnDivergence::Stop, OnDivergence::Recover]
+                .into_iter()
+                .flat_map(|on| with_and_without.clone().map(|l| (on, l)))
+            {
+                let plan = Plan { epochs: 40, optimiser: optimiser.clone(), on_divergence, lbfgs, ..Plan::default() };
                 let mut learner = learner(&topology(1, 0.0), &data(1, &[wave(25)]), plan, |_| ());
                 let (outcome, nll) = run(&mut learner);
                 if on_divergence == OnDivergence::Recover {

@@ -4,6 +4,7 @@ use super::adam::AdamRule;
 use super::batches::Batches;
 use super::divergence::Divergence;
 use super::guard::{self, Guard, Recovery};
+use super::lbfgs::LbfgsRule;
 use super::momentum::MomentumRule;
 use super::plan::{OnDivergence, Optimiser, Plan};
 use super::state::Fields;
@@ -38,9 +39,9 @@ pub struct EpochReport {
     pub mse: f64,
     /// ln L_init in nats (2.16).
     pub ln_prior: f64,
-    /// The rate for shared parameters.
+    /// The rate for shared parameters; in L-BFGS, the length of the last step, 1 before the first.
     pub rate_shared: f64,
-    /// The rate for initial states.
+    /// The rate for initial states; in L-BFGS the same.
     pub rate_initial: f64,
     /// Length of the gradient of ln L_out per step and channel in the shared parameters; in batches, of the last one.
     pub gradient_norm: f64,
@@ -133,6 +134,8 @@ pub struct Learner {
     data: Dataset,
     terms: f64,
     batches: Batches,
+    /// The rule of the last epochs. It never needs to be brought back, so it is no part of the state.
+    lbfgs: Option<LbfgsRule>,
     /// Whether `batches` already holds what the next report says.
     evaluated: bool,
 }
@@ -165,13 +168,14 @@ impl Learner {
             .collect();
         let total = data.total_steps(delay);
         let variance = plan.initial_state_variance;
+        let first = plan.epochs_of_optimiser();
         let rule = match &plan.optimiser {
             Optimiser::Momentum(options) => {
                 Rule::Momentum(MomentumRule::new(options.clone(), topology, &initial_states, total, variance))
             }
             Optimiser::Adam(options) => {
                 let options = options.clone();
-                Rule::Adam(AdamRule::new(options, topology, &initial_states, total, variance, plan.epochs))
+                Rule::Adam(AdamRule::new(options, topology, &initial_states, total, variance, first))
             }
         };
         let batch_size = match &plan.optimiser {
@@ -180,10 +184,11 @@ impl Learner {
         };
         let batches = Batches::new(topology, &items, batch_size, plan.recompute, engine);
         let terms = (total * topology.channels()) as f64;
+        let lbfgs = plan.lbfgs.as_ref().map(|options| LbfgsRule::new(options, topology, sequences, terms, variance));
         let state = State { network, initial_states, rule, epoch: 0 };
         let guard = (plan.on_divergence == OnDivergence::Recover).then(|| Guard::new(&state));
         let last_good = state.clone();
-        Ok(Self { last_good, state, guard, plan, data: data.clone(), terms, batches, evaluated: false })
+        Ok(Self { last_good, state, guard, plan, data: data.clone(), terms, batches, lbfgs, evaluated: false })
     }
 
     /// Goes on from a checkpoint, of which `new` got the network and the initial states.
@@ -199,6 +204,11 @@ impl Learner {
             self.state.rule.slow_down(guard.rate_factor());
         }
         self.evaluated = self.batches.load(state)?;
+        if self.has_refined()
+            && let Some(lbfgs) = &mut self.lbfgs
+        {
+            lbfgs.fields().load(state)?;
+        }
         Ok(())
     }
 
@@ -233,10 +243,27 @@ impl Learner {
         if let Some(guard) = &self.guard {
             guard.save(&mut state);
         }
-        if self.evaluated {
+        // L-BFGS needs gradients too, so what it goes on from is evaluated again.
+        if self.evaluated && !self.refines() {
             self.batches.save(&mut state);
         }
+        if self.has_refined() {
+            let lbfgs = self.lbfgs.clone().map(|mut lbfgs| lbfgs.fields().save());
+            let OptimiserState { tensors, numbers } = lbfgs.unwrap_or_default();
+            state.tensors.extend(tensors);
+            state.numbers.extend(numbers);
+        }
         state
+    }
+
+    /// Whether the next update is one of L-BFGS.
+    fn refines(&self) -> bool {
+        self.lbfgs.is_some() && self.state.epoch >= self.plan.epochs_of_optimiser()
+    }
+
+    /// Whether the last update was.
+    fn has_refined(&self) -> bool {
+        self.lbfgs.is_some() && self.state.epoch > self.plan.epochs_of_optimiser()
     }
 
     /// Learns to the end of the plan, or until the observer stops it.
@@ -318,9 +345,10 @@ impl Learner {
     fn report(&self) -> EpochReport {
         let topology = &self.state.network.topology;
         let ln_likelihood = self.batches.ln_likelihood();
-        let (rate_shared, rate_initial) = match &self.state.rule {
-            Rule::Momentum(rule) => rule.rates(),
-            Rule::Adam(rule) => rule.rates(self.state.epoch),
+        let (rate_shared, rate_initial) = match (&self.lbfgs, &self.state.rule) {
+            (Some(lbfgs), _) if self.refines() => (lbfgs.step, lbfgs.step),
+            (_, Rule::Momentum(rule)) => rule.rates(),
+            (_, Rule::Adam(rule)) => rule.rates(self.state.epoch),
         };
         EpochReport {
             epoch: self.state.epoch,
@@ -336,11 +364,16 @@ impl Learner {
     }
 
     fn update(&mut self) {
+        let refines = self.refines();
         let State { network, initial_states, rule, epoch } = &mut self.state;
         self.evaluated = false;
+        if let Some(lbfgs) = self.lbfgs.as_mut().filter(|_| refines) {
+            self.evaluated = lbfgs.ascend(&mut self.batches, &mut network.parameters, initial_states);
+            return;
+        }
         match rule {
             Rule::Adam(rule) => {
-                let last = *epoch + 1 == self.plan.epochs;
+                let last = *epoch + 1 == self.plan.epochs_of_optimiser();
                 let state = (&mut network.parameters, initial_states);
                 // After several updates the values that they began from stand for the epoch, but for the last.
                 self.evaluated = self.batches.ascend(rule, *epoch, state) && !last;

@@ -6,6 +6,7 @@ mod adam;
 mod batches;
 mod divergence;
 mod guard;
+mod lbfgs;
 mod learner;
 mod momentum;
 mod plan;
@@ -14,7 +15,7 @@ mod state;
 pub use divergence::Divergence;
 pub use guard::Recovery;
 pub use learner::{Control, EpochReport, Learner, Observer, Outcome};
-pub use plan::{Adam, AdaptiveRate, Momentum, OnDivergence, Optimiser, Plan, PriorStep};
+pub use plan::{Adam, AdaptiveRate, Lbfgs, Momentum, OnDivergence, Optimiser, Plan, PriorStep};
 
 #[cfg(test)]
 mod extremes_tests;

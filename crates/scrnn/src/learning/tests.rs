@@ -35,6 +35,11 @@ fn batches(epochs: u64) -> Plan {
     Plan { epochs, optimiser: Optimiser::Adam(options), ..Plan::default() }
 }
 
+/// A plan whose last epochs are L-BFGS.
+fn refined(plan: Plan, share: f64) -> Plan {
+    Plan { lbfgs: Some(Lbfgs { share, memory: 5 }), ..plan }
+}
+
 /// Runs, and returns the objective of every epoch.
 fn run(learner: &mut Learner) -> (Outcome, Vec<f64>) {
     let mut history = Vec::new();
@@ -54,7 +59,9 @@ fn bits(learner: &Learner) -> Vec<u64> {
 #[test]
 fn every_optimiser_ascends() {
     let adaptive = Momentum { adaptive: Some(AdaptiveRate::default()), ..Momentum::default() };
-    for plan in [momentum(4000, Momentum::default()), momentum(800, adaptive), adam(800), batches(500)] {
+    for plan in
+        [momentum(4000, Momentum::default()), momentum(800, adaptive), adam(800), batches(500), refined(adam(100), 1.0)]
+    {
         let mut learner = learner(plan.clone(), 1);
         let (outcome, history) = run(&mut learner);
         assert_eq!((outcome, history.len() as u64), (Outcome::Finished, plan.epochs + 1));
@@ -85,7 +92,15 @@ fn a_learner_without_variance_lowers_the_squared_error() {
 fn stopping_and_restoring_goes_on_bit_for_bit() {
     let adaptive = Momentum { adaptive: Some(AdaptiveRate::default()), ..Momentum::default() };
     let narrow = Plan { initial_state_variance: 1e-5, ..momentum(60, Momentum::default()) };
-    for plan in [momentum(60, Momentum::default()), momentum(60, adaptive), adam(60), batches(60), narrow] {
+    for plan in [
+        momentum(60, Momentum::default()),
+        momentum(60, adaptive),
+        adam(60),
+        batches(60),
+        narrow,
+        refined(adam(60), 0.8),
+        refined(batches(60), 0.8),
+    ] {
         let mut whole = learner(plan.clone(), 1);
         run(&mut whole);
 
@@ -110,17 +125,21 @@ fn stopping_and_restoring_goes_on_bit_for_bit() {
 fn any_number_of_threads_learns_the_same_bits() {
     let data = waves(14, 80);
     let topology = Topology::s_ctrnn(1, 8, 2.0).unwrap();
-    let learn = |threads: usize, batch_size: usize| {
+    let learn_in = |threads: usize, batch_size: usize, share: f64| {
         let (network, states) = initialize(&topology, 14, 5);
         let engine = Engine::new(threads, InstructionSet::best()).unwrap();
         let plan = Plan { optimiser: Optimiser::Adam(Adam { batch_size, ..Adam::default() }), ..adam(40) };
+        let plan = refined(plan, share);
         let mut learner = Learner::new(network, states, &data, plan, &engine).unwrap();
         run(&mut learner);
         bits(&learner)
     };
+    let learn = |threads: usize, batch_size: usize| learn_in(threads, batch_size, 0.0);
     for batch_size in [0, 8, 3] {
-        let one = learn(1, batch_size);
-        assert!(learn(2, batch_size) == one && learn(4, batch_size) == one);
+        for share in [0.0, 0.5] {
+            let one = learn_in(1, batch_size, share);
+            assert!(learn_in(2, batch_size, share) == one && learn_in(4, batch_size, share) == one);
+        }
     }
     // One batch of all is no batch.
     assert!(learn(1, 0) == learn(1, 14) && learn(1, 0) == learn(1, 1000) && learn(1, 0) != learn(1, 13));
@@ -171,6 +190,48 @@ fn values_that_end_in_the_middle_of_an_epoch_are_rolled_back_to_its_beginning() 
     assert_eq!(brought_back.run(&mut watch), Outcome::Finished);
     assert!(!watch.recoveries.is_empty());
     assert!(watch.reports.iter().all(|report| report.ln_likelihood.is_finite()));
+}
+
+#[test]
+fn lbfgs_takes_over_from_its_share_on_never_falls_and_gets_further() {
+    let mut trained = learner(refined(batches(300), 0.4), 1);
+    let mut watch = Watch::default();
+    assert_eq!(trained.run(&mut watch), Outcome::Finished);
+    let mut adam_alone = learner(batches(180), 1);
+    let mut before = Watch::default();
+    adam_alone.run(&mut before);
+    // The optimiser's epochs are those of a plan of its own, its schedule included; the last evaluation is of all at once.
+    assert_eq!(watch.reports.len(), 301);
+    assert_eq!(watch.reports[..180], before.reports[..180]);
+    let at = |k: usize| (watch.reports[k].epoch, watch.reports[k].ln_likelihood, watch.reports[k].mse);
+    assert_eq!(at(180), (180, before.reports[180].ln_likelihood, before.reports[180].mse));
+    let all: Vec<f64> = watch.reports[180..].iter().map(|report| report.ln_likelihood + report.ln_prior).collect();
+    assert!(all.windows(2).all(|pair| pair[1] >= pair[0]), "{all:?}");
+    // As many epochs of Adam, at any of three rates, stay far behind.
+    for rate in [0.03, 0.01, 0.003] {
+        let options = Adam { rate, ..Adam::default() };
+        let mut other = learner(Plan { optimiser: Optimiser::Adam(options), ..adam(300) }, 1);
+        let (_, history) = run(&mut other);
+        assert!(watch.reports[300].ln_likelihood > history[300] + 50.0, "{rate}: {}", history[300]);
+    }
+}
+
+#[test]
+fn a_checkpoint_without_the_pairs_of_lbfgs_is_refused() {
+    let plan = refined(adam(20), 0.5);
+    let mut old = learner(plan.clone(), 1);
+    run(&mut old);
+    let take_up = |epoch: u64, state: &crate::checkpoint::OptimiserState| {
+        let (network, states) = (old.network().clone(), old.initial_states().clone());
+        let mut new = Learner::new(network, states, &waves(3, 60), plan.clone(), &Engine::serial()).unwrap();
+        new.restore(epoch, state)
+    };
+    let mut state = old.optimiser_state();
+    assert_eq!(take_up(20, &state), Ok(()));
+    state.tensors.retain(|tensor| tensor.name != "lbfgs.changes");
+    assert!(take_up(20, &state).unwrap_err().to_string().contains("optimiser.lbfgs.changes is missing"));
+    // Before its first update there are none.
+    assert_eq!(take_up(10, &state), Ok(()));
 }
 
 #[test]
@@ -229,6 +290,9 @@ fn settings_out_of_range_are_refused_by_name() {
     let refuse = |plan: Plan| plan.check().unwrap_err().to_string();
     assert!(refuse(Plan { initial_state_variance: 0.0, ..Plan::default() }).contains("initial_state_variance is 0"));
     assert!(refuse(momentum(1, Momentum { momentum: 1.0, ..Momentum::default() })).contains("momentum.momentum is 1"));
+    assert!(refuse(refined(adam(1), 1.5)).contains("lbfgs.share is 1.5"));
+    let none = Plan { lbfgs: Some(Lbfgs { memory: 0, ..Lbfgs::default() }), ..adam(1) };
+    assert!(refuse(none).contains("lbfgs.memory is 0"));
     assert!(refuse(momentum(1, Momentum { rate: f64::NAN, ..Momentum::default() })).contains("momentum.rate is NaN"));
 }
 
@@ -288,7 +352,7 @@ fn a_training_that_leaves_its_course_is_brought_back_and_ends_well() {
 
 #[test]
 fn a_guard_that_is_not_needed_changes_no_bit() {
-    for plan in [momentum(200, Momentum::default()), adam(200), batches(200)] {
+    for plan in [momentum(200, Momentum::default()), adam(200), batches(200), refined(adam(100), 0.5)] {
         let [mut with, mut without] = [OnDivergence::Recover, OnDivergence::Stop]
             .map(|on_divergence| learner(Plan { on_divergence, ..plan.clone() }, 1));
         assert_eq!(run(&mut with), run(&mut without));

@@ -23,7 +23,8 @@ pub fn check(checkpoint: &Checkpoint, now: Notes, experiment: &Experiment, path:
     changes.retain(|change| change.key != "data.files");
     // A run of a version that did not bring trainings back comes to the same as long as it did not need to.
     changes.retain(|change| change.key != "training.on_divergence" || change.old.is_some());
-    let by_momentum = experiment.training.optimiser == OptimiserName::Momentum;
+    let by_lbfgs = experiment.training.lbfgs.is_some();
+    let by_momentum = experiment.training.optimiser == OptimiserName::Momentum && !by_lbfgs;
     let is_epochs = |change: &Difference| change.key == "training.epochs";
     if by_momentum && experiment.training.epochs >= checkpoint.epoch {
         // Momentum has no schedule: a longer run begins as a shorter one.
@@ -34,6 +35,7 @@ pub fn check(checkpoint: &Checkpoint, now: Notes, experiment: &Experiment, path:
         let message = format!("the experiment changed since the run in {folder} began:\n{}", list.join("\n"));
         let help = match changes.iter().any(is_epochs) {
             true if by_momentum => format!("the run is already at epoch {}", checkpoint.epoch),
+            true if by_lbfgs => format!("the number of epochs decides where L-BFGS begins; {anew}"),
             true => format!("with adam the number of epochs shapes the rate from the first epoch on; {anew}"),
             false => anew.to_owned(),
         };
