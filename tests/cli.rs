@@ -58,6 +58,11 @@ fn sine_in_batches() -> String {
         .replace("[training.adam]", "[training.adam]\nbatch_size = 1")
 }
 
+/// The same, two thirds of it by L-BFGS.
+fn sine_with_lbfgs() -> String {
+    sine_in_batches() + "[training.lbfgs]\nshare = 0.667\nmemory = 4\n"
+}
+
 /// A folder to work in; all paths of a command line are relative to it.
 struct Place(tempfile::TempDir);
 

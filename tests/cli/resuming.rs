@@ -3,7 +3,7 @@
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::{Place, SINE, epochs, sine_in_batches, sine_with_adam};
+use crate::{Place, SINE, epochs, sine_in_batches, sine_with_adam, sine_with_lbfgs};
 
 /// The files that must come out the same.
 const RESULTS: [&str; 2] = ["checkpoint.safetensors", "best.safetensors"];
@@ -36,7 +36,7 @@ pub fn wait_for(place: &Place, name: &str) {
 
 #[test]
 fn a_run_that_is_killed_again_and_again_comes_to_the_same_bits() {
-    for experiment in [SINE.to_owned(), sine_with_adam(), sine_in_batches()] {
+    for experiment in [SINE.to_owned(), sine_with_adam(), sine_in_batches(), sine_with_lbfgs()] {
         let place = Place::with(&experiment.replace("epochs = 120", "epochs = 6000"));
         place.ok("train sine.toml --out whole --set output.checkpoint_every=3000");
         let mut killed = 0;
@@ -144,6 +144,29 @@ fn a_changed_experiment_is_refused_with_the_difference() {
     assert!(told.contains("training.optimiser: \"adam\" -> \"momentum\""), "{told}");
     assert_eq!(before, place.read("run/checkpoint.safetensors"));
     place.ok("train run --resume --set output.history_every=5 --set training.recompute=true");
+}
+
+#[test]
+fn lbfgs_makes_the_last_epochs_and_their_number_is_part_of_the_experiment() {
+    let place = Place::with(&sine_with_lbfgs());
+    let found = place.json("train sine.toml --out run --set output.history_every=1 --json");
+    // 40 epochs of Adam, whose rate ends at 0; then steps of 1 as a rule.
+    let history = place.text("run/history.csv");
+    let column = |name: &str| {
+        let index = history.lines().next().unwrap().split(',').position(|column| column == name).unwrap();
+        let cells = history.lines().skip(1).map(move |line| line.split(',').nth(index).unwrap());
+        cells.map(|cell| cell.parse::<f64>().unwrap()).collect::<Vec<f64>>()
+    };
+    let (rate, nll) = (column("rate_shared"), column("nll"));
+    assert_eq!((rate.len(), rate[40]), (121, 1.0));
+    assert!(rate[..40].iter().all(|&rate| rate <= 1e-3), "{rate:?}");
+    assert!(rate[41..].iter().filter(|&&step| step == 1.0).count() > 60, "{rate:?}");
+    assert_eq!(found["nll"].as_f64(), Some(nll[120]));
+    assert!(nll[120] < nll[40] - 0.5, "{} to {}", nll[40], nll[120]);
+    let (_, told) = place.fails(5, "train run --resume --epochs 200");
+    assert!(told.contains("training.epochs: 120 -> 200") && told.contains("where L-BFGS begins"), "{told}");
+    let (_, told) = place.fails(2, "train sine.toml --out other --set training.lbfgs.share=1.5");
+    assert!(told.contains("`training.lbfgs.share` is 1.5") && told.contains("from 0 to 1"), "{told}");
 }
 
 #[test]

@@ -109,20 +109,6 @@ impl Batches {
         (&self.batches[0].objective.gradients, &self.batches[0].objective.initial)
     }
 
-    /// d ln L_out / d (theta_share, u_0) of all sequences, evaluated at the same parameters: shared parameters, then sequence by
-    /// sequence. What else `out` has room for stays as it is.
-    pub fn sum_gradients(&self, out: &mut [f64]) {
-        let shared = self.batches[0].objective.gradients.as_slice().len();
-        let (out, initial) = out.split_at_mut(shared);
-        out.fill(0.0);
-        for Batch { sequences, objective, .. } in &self.batches {
-            out.iter_mut().zip(objective.gradients.as_slice()).for_each(|(out, g)| *out += g);
-            for (&sequence, own) in sequences.iter().zip(objective.initial.chunks_exact(self.units)) {
-                initial[sequence * self.units..(sequence + 1) * self.units].copy_from_slice(own);
-            }
-        }
-    }
-
     /// Evaluates all sequences at the same parameters.
     pub fn evaluate(&mut self, parameters: &Parameters, states: &InitialStates) {
         self.broken = None;

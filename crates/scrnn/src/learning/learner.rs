@@ -136,6 +136,8 @@ pub struct Learner {
     batches: Batches,
     /// The rule of the last epochs. It never needs to be brought back, so it is no part of the state.
     lbfgs: Option<LbfgsRule>,
+    /// All sequences in one batch, for the last epochs after others in several.
+    whole: Option<Batches>,
     /// Whether `batches` already holds what the next report says.
     evaluated: bool,
 }
@@ -182,13 +184,15 @@ impl Learner {
             Optimiser::Adam(adam) if adam.batch_size > 0 => adam.batch_size,
             _ => sequences,
         };
-        let batches = Batches::new(topology, &items, batch_size, plan.recompute, engine);
+        let batches = |size| Batches::new(topology, &items, size, plan.recompute, engine);
+        let whole = (plan.lbfgs.is_some() && batch_size < sequences).then(|| batches(sequences));
+        let batches = batches(batch_size);
         let terms = (total * topology.channels()) as f64;
         let lbfgs = plan.lbfgs.as_ref().map(|options| LbfgsRule::new(options, topology, sequences, terms, variance));
         let state = State { network, initial_states, rule, epoch: 0 };
         let guard = (plan.on_divergence == OnDivergence::Recover).then(|| Guard::new(&state));
         let last_good = state.clone();
-        Ok(Self { last_good, state, guard, plan, data: data.clone(), terms, batches, lbfgs, evaluated: false })
+        Ok(Self { last_good, state, guard, plan, data: data.clone(), terms, batches, lbfgs, whole, evaluated: false })
     }
 
     /// Goes on from a checkpoint, of which `new` got the network and the initial states.
@@ -203,6 +207,7 @@ impl Learner {
             guard.load(state)?;
             self.state.rule.slow_down(guard.rate_factor());
         }
+        self.take_whole();
         self.evaluated = self.batches.load(state)?;
         if self.has_refined()
             && let Some(lbfgs) = &mut self.lbfgs
@@ -243,8 +248,7 @@ impl Learner {
         if let Some(guard) = &self.guard {
             guard.save(&mut state);
         }
-        // L-BFGS needs gradients too, so what it goes on from is evaluated again.
-        if self.evaluated && !self.refines() {
+        if self.evaluated {
             self.batches.save(&mut state);
         }
         if self.has_refined() {
@@ -270,6 +274,7 @@ impl Learner {
     pub fn run(&mut self, observer: &mut dyn Observer) -> Outcome {
         self.last_good.copy_from(&self.state);
         loop {
+            self.take_whole();
             self.evaluate();
             if let Some(divergence) = self.divergence() {
                 if let Some(recovery) = self.recover(&divergence) {
@@ -293,6 +298,15 @@ impl Learner {
             }
             self.update();
             self.state.epoch += 1;
+        }
+    }
+
+    /// Puts all sequences into one batch where L-BFGS begins.
+    fn take_whole(&mut self) {
+        if self.refines()
+            && let Some(whole) = self.whole.take()
+        {
+            (self.batches, self.evaluated) = (whole, false);
         }
     }
 

@@ -343,8 +343,8 @@ fn swings(findings: &Findings) -> Block {
             row("the learned sequences", &findings.learned),
         ],
         note: "A cycle lasts from one upward crossing of 0 to the next; its amplitude is half the distance between its highest and \
-               lowest value. Network and oscillator run for ten times 10000 steps; the learned sequences are too short to tell \
-               5 % apart."
+               lowest value. Network and oscillator run for 50000 steps from each sequence's start; the learned sequences are too short \
+               to tell 5 % apart."
             .into(),
     })
 }
