@@ -163,6 +163,7 @@ fn lbfgs_makes_the_last_epochs_and_their_number_is_part_of_the_experiment() {
     assert!(rate[41..].iter().filter(|&&step| step == 1.0).count() > 60, "{rate:?}");
     assert_eq!(found["nll"].as_f64(), Some(nll[120]));
     assert!(nll[120] < nll[40] - 0.5, "{} to {}", nll[40], nll[120]);
+    assert!(place.ok("inspect run").contains("adam, then L-BFGS"));
     let (_, told) = place.fails(5, "train run --resume --epochs 200");
     assert!(told.contains("training.epochs: 120 -> 200") && told.contains("where L-BFGS begins"), "{told}");
     let (_, told) = place.fails(2, "train sine.toml --out other --set training.lbfgs.share=1.5");

@@ -135,7 +135,8 @@ fn network_text(trained: &Trained, path: &Path) -> String {
     let lengths = notes.as_ref().map(|notes| lengths(&notes.data.lengths)).unwrap_or_default();
     line("sequences", format!("{}{lengths}", checkpoint.sequences.len()));
     if let Some(optimiser) = experiment.and_then(|experiment| experiment["training"]["optimiser"].as_str()) {
-        line("optimiser", optimiser.to_owned());
+        let refined = experiment.is_some_and(|experiment| experiment["training"]["lbfgs"].is_object());
+        line("optimiser", format!("{optimiser}{}", if refined { ", then L-BFGS" } else { "" }));
     }
     let name = experiment.and_then(|experiment| experiment["name"].as_str()).unwrap_or("a network");
     format!("{}: {name}\n{}", path.display(), table.to_string().trim_start_matches('\n'))
