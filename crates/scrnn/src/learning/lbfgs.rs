@@ -11,6 +11,8 @@
 use super::batches::Batches;
 use super::plan::Lbfgs;
 use super::state::Fields;
+use crate::checkpoint::OptimiserState;
+use crate::error::{Error, Result};
 use crate::initial_states::InitialStates;
 use crate::parameters::Parameters;
 use crate::topology::Topology;
@@ -224,6 +226,22 @@ impl LbfgsRule {
             self.next = ((place + 1) % self.memory) as f64;
             self.held = (self.held + 1.0).min(self.memory as f64);
         }
+    }
+
+    /// Takes what was kept out of a checkpoint.
+    ///
+    /// # Errors
+    /// [`Error::Checkpoint`] if a part is missing, of another size, or counts pairs that cannot be there.
+    pub fn load(&mut self, state: &OptimiserState) -> Result<()> {
+        self.fields().load(state)?;
+        let memory = self.memory as f64;
+        for (name, count, most) in [("held", self.held, memory), ("next", self.next, memory - 1.0)] {
+            if !(count.fract() == 0.0 && (0.0..=most).contains(&count)) {
+                let what = format!("the optimiser's lbfgs.{name} is {count}; needed: a whole number up to {most}");
+                return Err(Error::Checkpoint(what));
+            }
+        }
+        Ok(())
     }
 
     /// What has to be kept to go on.

@@ -212,7 +212,7 @@ impl Learner {
         if self.has_refined()
             && let Some(lbfgs) = &mut self.lbfgs
         {
-            lbfgs.fields().load(state)?;
+            lbfgs.load(state)?;
         }
         Ok(())
     }

@@ -217,7 +217,7 @@ fn lbfgs_takes_over_from_its_share_on_never_falls_and_gets_further() {
 }
 
 #[test]
-fn a_checkpoint_without_the_pairs_of_lbfgs_is_refused() {
+fn a_checkpoint_without_the_pairs_of_lbfgs_or_with_impossible_ones_is_refused() {
     let plan = refined(adam(20), 0.5);
     let mut old = learner(plan.clone(), 1);
     run(&mut old);
@@ -228,6 +228,11 @@ fn a_checkpoint_without_the_pairs_of_lbfgs_is_refused() {
     };
     let mut state = old.optimiser_state();
     assert_eq!(take_up(20, &state), Ok(()));
+    for (name, wrong) in [("lbfgs.held", 6.0), ("lbfgs.next", 5.0), ("lbfgs.next", f64::NAN), ("lbfgs.held", -1.0)] {
+        let mut strange = state.clone();
+        strange.numbers.iter_mut().filter(|(other, _)| other == name).for_each(|(_, value)| *value = wrong);
+        assert!(take_up(20, &strange).unwrap_err().to_string().contains(name), "{name} {wrong}");
+    }
     state.tensors.retain(|tensor| tensor.name != "lbfgs.changes");
     assert!(take_up(20, &state).unwrap_err().to_string().contains("optimiser.lbfgs.changes is missing"));
     // Before its first update there are none.
