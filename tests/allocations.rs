@@ -40,9 +40,9 @@ fn after_the_first_epochs_an_epoch_allocates_nothing() {
         (false, momentum(), 0.0),
         (true, momentum(), 0.0),
         (false, in_batches.clone(), 0.0),
-        // L-BFGS from the start, and from the tenth of twenty epochs on.
+        // L-BFGS from the start, and after an epoch in batches: its one large batch takes its memory where it begins.
         (false, momentum(), 1.0),
-        (false, in_batches, 0.5),
+        (false, in_batches, 0.95),
     ] {
         let (network, states) = initialize(&topology, 3, 1);
         let lbfgs = Some(Lbfgs { share, memory: 4 });
