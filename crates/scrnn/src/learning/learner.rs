@@ -185,7 +185,11 @@ impl Learner {
             _ => sequences,
         };
         let batches = |size| Batches::new(topology, &items, size, plan.recompute, engine);
-        let whole = (plan.lbfgs.is_some() && batch_size < sequences).then(|| batches(sequences));
+        let mut whole = (plan.lbfgs.is_some() && batch_size < sequences).then(|| batches(sequences));
+        if let Some(whole) = &mut whole {
+            // A first pass takes the memory, so that no epoch does.
+            whole.evaluate(&network.parameters, &initial_states);
+        }
         let batches = batches(batch_size);
         let terms = (total * topology.channels()) as f64;
         let lbfgs = plan.lbfgs.as_ref().map(|options| LbfgsRule::new(options, topology, sequences, terms, variance));

@@ -5,7 +5,8 @@ use crate::error::{Error, Result};
 /// A training.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// Passes through the data; each is one update, but for Adam in batches.
+    /// Passes through the data; each is one update, but for Adam in batches. An epoch of L-BFGS is an update, and now and then more
+    /// than one pass.
     pub epochs: u64,
     /// sigma^2_IS, the variance of the initial states around their mean (2.13).
     pub initial_state_variance: f64,

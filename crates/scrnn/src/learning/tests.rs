@@ -129,7 +129,7 @@ fn any_number_of_threads_learns_the_same_bits() {
         let (network, states) = initialize(&topology, 14, 5);
         let engine = Engine::new(threads, InstructionSet::best()).unwrap();
         let plan = Plan { optimiser: Optimiser::Adam(Adam { batch_size, ..Adam::default() }), ..adam(40) };
-        let plan = refined(plan, share);
+        let plan = if share > 0.0 { refined(plan, share) } else { plan };
         let mut learner = Learner::new(network, states, &data, plan, &engine).unwrap();
         run(&mut learner);
         bits(&learner)
