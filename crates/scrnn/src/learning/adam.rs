@@ -6,12 +6,11 @@
 //! ```
 //!
 //! before which weights w <- (1 - rate(n) decay) w if decay is above 0 (decoupled weight decay, Loshchilov and Hutter 2019).
-//! Initial states are written u_0 = mean + s z, s = min(sigma_IS, 1). Then d ln L_all / dz = s d ln L_out / du_0 -
-//! (s / sigma_IS)^2 z, and moving the mean moves all u_0 with it, so its gradient has no prior term: neither is stiff,
-//! however narrow the prior.
+//! Initial states move in [`Coordinates`] that are not stiff, however narrow the prior.
 
 use std::ops::Range;
 
+use super::coordinates::Coordinates;
 use super::plan::Adam;
 use super::state::Fields;
 use crate::initial_states::InitialStates;
@@ -80,9 +79,7 @@ pub(super) struct AdamRule {
     epochs: u64,
     /// The average of T N_O over sequences.
     terms: f64,
-    /// s, and (s / sigma_IS)^2.
-    spread: (f64, f64),
-    learns: Vec<bool>,
+    coordinates: Coordinates,
     scratch: Vec<f64>,
     z: Vec<f64>,
 }
@@ -98,7 +95,6 @@ impl AdamRule {
     ) -> Self {
         let parameters = Parameters::zeros(topology).as_slice().len();
         let terms = (total_steps * topology.channels()) as f64;
-        let s = variance.sqrt().min(1.0);
         Self {
             options,
             guarded: 1.0,
@@ -107,8 +103,7 @@ impl AdamRule {
             mean: Moments::new(states.mean().len()),
             epochs,
             terms: terms / states.sequences() as f64,
-            spread: (s, s * s / variance),
-            learns: topology.per_unit(|group| group.learns_initial_state).collect(),
+            coordinates: Coordinates::new(topology, variance),
             scratch: vec![0.0; parameters.max(states.values().len())],
             z: vec![0.0; states.values().len()],
         }
@@ -163,20 +158,16 @@ impl AdamRule {
         }
         self.shared.ascend(&adam, batch.update, rate, scratch, parameters.as_mut_slice());
 
-        let units = self.learns.len();
-        let (s, pull) = self.spread;
+        let units = states.mean().len();
         // Each sequence is met once an epoch.
         let (met, own_rate) = (batch.epoch + 1, rate * adam.initial_state_factor);
-        for (index, z) in self.z.iter_mut().enumerate() {
-            let i = index % units;
-            *z = if self.learns[i] { (states.values()[index] - states.mean()[i]) / s } else { 0.0 };
-        }
+        self.coordinates.read(states, &mut self.z);
         for (&sequence, initial) in batch.sequences.iter().zip(initial.chunks_exact(units)) {
             let own = sequence * units..(sequence + 1) * units;
             let z = &mut self.z[own.clone()];
             let scratch = &mut self.scratch[..units];
             for (i, (out, g)) in scratch.iter_mut().zip(initial).enumerate() {
-                *out = if self.learns[i] { (s * g - pull * z[i]) / self.terms } else { 0.0 };
+                *out = self.coordinates.slope(i, *g, z[i]) / self.terms;
             }
             self.initial.ascend_range(own, &adam, met, own_rate, scratch, z);
         }
@@ -186,13 +177,7 @@ impl AdamRule {
             *out = initial.iter().skip(i).step_by(units).sum::<f64>() / batch.terms;
         }
         self.mean.ascend(&adam, batch.update, rate * adam.mean_factor, scratch, states.mean_mut());
-        for (index, z) in self.z.iter().enumerate() {
-            let i = index % units;
-            if self.learns[i] {
-                let mean = states.mean()[i];
-                states.values_mut()[index] = mean + s * z;
-            }
-        }
+        self.coordinates.write(&self.z, states);
     }
 
     /// Takes over what another rule of the same training remembers; allocates nothing.
@@ -207,7 +192,7 @@ impl AdamRule {
 
     /// What has to be kept to go on.
     pub fn fields(&mut self) -> Fields<'_> {
-        let (parameters, units) = (self.shared.first.len(), self.learns.len());
+        let (parameters, units) = (self.shared.first.len(), self.mean.first.len());
         let states = vec![self.initial.first.len() / units, units];
         Fields {
             tensors: vec![

@@ -6,9 +6,10 @@
 //!
 //! The step t is 1 where that will do; otherwise it is doubled or bisected until it gains enough and the slope along it is
 //! nearly gone (the weak Wolfe conditions), which makes every pair's curvature positive. So ln L_all never falls.
-//! Initial states are written u_0 = mean + s z as for Adam. The pairs are all that is remembered from one update to the next.
+//! Initial states move in [`Coordinates`], as Adam's do. The pairs are all that is remembered from one update to the next.
 
 use super::batches::Batches;
+use super::coordinates::Coordinates;
 use super::plan::Lbfgs;
 use super::state::Fields;
 use crate::checkpoint::OptimiserState;
@@ -46,9 +47,9 @@ pub(super) struct LbfgsRule {
     pub step: f64,
     /// 1 when no step was found that gains anything; then nothing moves any more.
     converged: f64,
-    /// s, and (s / sigma_IS)^2.
-    spread: (f64, f64),
-    learns: Vec<bool>,
+    coordinates: Coordinates,
+    /// Units with an initial state each.
+    units: usize,
     shared: usize,
     terms: f64,
 }
@@ -57,7 +58,6 @@ impl LbfgsRule {
     pub fn new(options: &Lbfgs, topology: &Topology, sequences: usize, terms: f64, variance: f64) -> Self {
         let shared = Parameters::zeros(topology).as_slice().len();
         let len = shared + (sequences + 1) * topology.context_units();
-        let s = variance.sqrt().min(1.0);
         let zeros = || vec![0.0; len];
         Self {
             at: zeros(),
@@ -73,8 +73,8 @@ impl LbfgsRule {
             along: vec![0.0; options.memory],
             step: 1.0,
             converged: 0.0,
-            spread: (s, s * s / variance),
-            learns: topology.per_unit(|group| group.learns_initial_state).collect(),
+            coordinates: Coordinates::new(topology, variance),
+            units: topology.context_units(),
             shared,
             terms,
         }
@@ -132,13 +132,9 @@ impl LbfgsRule {
     fn read(&mut self, parameters: &Parameters, states: &InitialStates) {
         let (shared, rest) = self.at.split_at_mut(self.shared);
         shared.copy_from_slice(parameters.as_slice());
-        let units = self.learns.len();
         let (z, mean) = rest.split_at_mut(states.values().len());
         mean.copy_from_slice(states.mean());
-        for (index, (z, u0)) in z.iter_mut().zip(states.values()).enumerate() {
-            let i = index % units;
-            *z = if self.learns[i] { (u0 - mean[i]) / self.spread.0 } else { 0.0 };
-        }
+        self.coordinates.read(states, z);
     }
 
     /// The network of theta.
@@ -147,19 +143,13 @@ impl LbfgsRule {
         parameters.as_mut_slice().copy_from_slice(shared);
         let (z, mean) = rest.split_at(states.values().len());
         states.mean_mut().copy_from_slice(mean);
-        let units = self.learns.len();
-        for (index, (u0, z)) in states.values_mut().iter_mut().zip(z).enumerate() {
-            let i = index % units;
-            if self.learns[i] {
-                *u0 = mean[i] + self.spread.0 * z;
-            }
-        }
+        self.coordinates.write(z, states);
     }
 
     /// ln L_all per step and channel, but for a constant.
     fn value(&self, theta: &[f64], batches: &Batches) -> f64 {
-        let z = &theta[self.shared..theta.len() - self.learns.len()];
-        (batches.ln_likelihood() - 0.5 * self.spread.1 * dot(z, z)) / self.terms
+        let z = &theta[self.shared..theta.len() - self.units];
+        (batches.ln_likelihood() - 0.5 * self.coordinates.pull() * dot(z, z)) / self.terms
     }
 
     /// The gradient of [`Self::value`] in theta, from d ln L_out / d (theta_share, u_0).
@@ -168,18 +158,16 @@ impl LbfgsRule {
             Point::Here => (&self.at, &mut self.gradient),
             Point::There => (&self.tried, &mut self.gradient_there),
         };
-        let units = self.learns.len();
-        let end = theta.len() - units;
+        let end = theta.len() - self.units;
         let (shared, initial) = batches.gradient_of_all();
         let (of_sequences, of_mean) = gradient.split_at_mut(end);
         of_sequences[..self.shared].copy_from_slice(shared.as_slice());
         of_sequences[self.shared..].copy_from_slice(initial);
         of_mean.fill(0.0);
-        let (s, pull) = self.spread;
         for (index, (g, z)) in of_sequences[self.shared..].iter_mut().zip(&theta[self.shared..end]).enumerate() {
-            let i = index % units;
+            let i = index % self.units;
             of_mean[i] += *g;
-            *g = if self.learns[i] { s * *g - pull * z } else { 0.0 };
+            *g = self.coordinates.slope(i, *g, *z);
         }
         gradient.iter_mut().for_each(|g| *g /= self.terms);
     }
@@ -323,7 +311,7 @@ mod tests {
                 let g = rule.gradient[i];
                 // A missing weight, and z of a unit that always starts from 0, are no coordinates.
                 let z = i.checked_sub(rule.shared).filter(|z| *z < 10);
-                if z.is_some_and(|z| !rule.learns[z % 5]) || theta[i] == 0.0 && g == 0.0 {
+                if z.is_some_and(|z| z % 5 < 3) || theta[i] == 0.0 && g == 0.0 {
                     assert_eq!(g, 0.0);
                     continue;
                 }

@@ -4,6 +4,7 @@
 
 mod adam;
 mod batches;
+mod coordinates;
 mod divergence;
 mod guard;
 mod lbfgs;

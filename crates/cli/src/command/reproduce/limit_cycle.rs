@@ -19,7 +19,7 @@ use crate::report::{Block, Chart, Figure, Panel, Section, Series, Sheet, Tone};
 
 /// Steps of the closed loop that is shown and compared.
 const STEPS: usize = 1000;
-/// Steps of the closed loops, and of the oscillator itself, whose swings are measured: 20 000 cycles from 30 sequences, which tell
+/// Steps of the closed loops, and of the oscillator itself, whose swings are measured: 40 000 cycles from 60 sequences, which tell
 /// their spread to within 1 %.
 const LONG: usize = 50_000;
 /// A swing counts once y was this far below 0.
