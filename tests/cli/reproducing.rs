@@ -174,7 +174,7 @@ fn the_oscillator_is_judged_on_sequences_that_were_not_learned() {
     let found = metrics(&place, "cycle");
     let oscillator = &found["seeds"][0]["findings"]["oscillator"];
     assert!((oscillator["period"].as_f64().unwrap() - 75.5).abs() < 2.0, "{oscillator}");
-    assert!(oscillator["cycles"].as_u64().unwrap() > 1200);
+    assert!(oscillator["cycles"].as_u64().unwrap() > 39_000);
     assert_eq!(found["verdicts"].as_array().unwrap().len(), 3);
 }
 

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! Moving the mean moves all u_0 with it, so that its gradient has no prior term. Units whose initial states are not learned
-//! have z = 0.
+//! have z = 0. (Recognition, which does not know learning, has its own, in the same form.)
 
 use crate::initial_states::InitialStates;
 use crate::topology::Topology;

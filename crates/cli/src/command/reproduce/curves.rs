@@ -22,13 +22,18 @@ use crate::source;
 
 /// Steps of each closed loop (3.2.3).
 const STEPS: usize = 1000;
-/// Samples of a pattern that recognition looks at: ten periods. In the open loop u_0 is forgotten after some tens of
-/// steps, so that later samples say nothing about it, and only make the ascent slower and rougher.
-const OBSERVED: usize = 10 * PERIOD;
+/// Samples of a pattern that recognition looks at: five periods. In the open loop u_0 is forgotten after some tens of
+/// steps, so that later samples say nothing about it, and only make the ascent slower.
+const OBSERVED: usize = 5 * PERIOD;
+/// The largest rate of recognition. A step leads into another curve's attractor where it is long: with ten periods, 147 and 174
+/// trials of 240 succeeded at 0.1 on two networks, 159 and 187 at 0.05, 202 and 194 at this, and with five periods 200 and 205
+/// (docs/decisions.md has the table).
+const RATE: f64 = 0.0125;
 /// Spread of the random starts, as a share of that of the learned states. The thesis does not say how its random values
 /// were drawn; those of 2.7 lie close to a neutral state, as these do. Far away the network begins in a wrong attractor.
 const SPREAD: f64 = 0.2;
-/// Decay of the second moment in recognition: 49 of 60 trials succeeded with this on one network, 44 with 0.999.
+/// Decay of the second moment in recognition: with ten periods, 202 and 194 trials succeeded on these networks, 147 and 178 with
+/// 0.99.
 const BETA_2: f64 = 0.9;
 /// Random orders of the labels that clustering is compared with.
 const SHUFFLES: usize = 9999;
@@ -376,13 +381,14 @@ impl Study for Curves {
     }
 }
 
-/// Whether a seed, training included, was done in time.
+/// Whether two cores do a seed, training included, in time. Seeds side by side have a core each: two cores do two of them in the
+/// time that one takes, so what counts is half of the cores' time.
 pub fn timely<F>(seeds: &[SeedResult<F>], seconds: f64) -> Verdict {
     let words = |seconds: f64| in_words(std::time::Duration::from_secs_f64(seconds));
-    let needed = format!("under {} on two cores at most", words(seconds));
+    let needed = format!("under {} of two cores", words(seconds));
     Verdict::every(seeds, "time of a seed", &needed, |seed| {
         let threads = if seed.threads == 1 { "1 thread".to_owned() } else { format!("{} threads", seed.threads) };
-        (format!("{}, {threads}", words(seed.seconds)), seed.seconds < seconds && seed.threads <= 2)
+        (format!("{}, {threads}", words(seed.seconds)), seed.seconds * seed.threads as f64 / 2.0 < seconds)
     })
 }
 
@@ -411,6 +417,7 @@ fn recognition<'a>(
         initial_state_variance: learned.experiment.network.initial_state_variance,
         warm_starts: vec![WarmStart::Random],
         random_spread: SPREAD,
+        rate: RATE,
         beta2: BETA_2,
         observed: Some(OBSERVED),
         // A training that was cut short for a trial does not deserve more.
@@ -449,6 +456,20 @@ fn recognition<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_counts_is_half_of_the_cores_time() {
+        let took = |seconds: f64, threads: usize| {
+            let verdict =
+                timely(&[SeedResult { seed: 1, seconds, threads, trainings: Vec::new(), findings: () }], 60.0);
+            (verdict.seeds[0].found.clone(), verdict.met)
+        };
+        assert_eq!(took(119.0, 1), ("1 min 59 s, 1 thread".to_owned(), true));
+        assert_eq!(took(121.0, 1), ("2 min 01 s, 1 thread".to_owned(), false));
+        assert_eq!(took(59.0, 2), ("59 s, 2 threads".to_owned(), true));
+        assert_eq!(took(29.0, 4), ("29 s, 4 threads".to_owned(), true));
+        assert_eq!(took(31.0, 4), ("31 s, 4 threads".to_owned(), false));
+    }
 
     #[test]
     fn a_curve_that_is_only_out_of_phase_has_no_error_at_its_best_phase() {
