@@ -298,7 +298,7 @@ impl Study for Curves {
                 measure(
                     "recognised_listening",
                     "Trials that predict well while they listen, of 240",
-                    "the same bound one step ahead of the pattern, where hardly anything can fail",
+                    "the same bound one step ahead of the pattern, which a network that regenerates nothing can meet, too",
                     "",
                     0,
                     |f| f.recognition.as_ref().map(|found| found.succeeded_listening as f64),
