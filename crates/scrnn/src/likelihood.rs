@@ -12,7 +12,7 @@
 use pulp::Simd;
 
 use crate::forward::Plain;
-use crate::kernels::activation::exp_slice;
+use crate::kernels::activation::{exp_slice, ln_slice};
 use crate::network::Network;
 
 /// ln(2 pi).
@@ -93,12 +93,16 @@ impl Predictions<'_> {
         } else {
             exp_slice(simd, 1.0, variance);
             for k in 0..n {
+                precisions[k] = variance[k] + floor;
+            }
+            ln_slice(precisions, terms);
+            for k in 0..n {
                 let y = mean[k];
                 let e = target[k] - y;
                 let v = variance[k] + floor;
                 let weighted = e * e / v;
                 squares[k] = e * e;
-                terms[k] = -0.5 * (LN_2PI + v.ln() + weighted);
+                terms[k] = -0.5 * (LN_2PI + terms[k] + weighted);
                 mean[k] = (1.0 - y * y) * e / v;
                 variance[k] = 0.5 * (weighted - 1.0) * (variance[k] / v);
             }
