@@ -99,7 +99,7 @@ impl Predictions<'_> {
             for k in 0..n {
                 let y = mean[k];
                 let e = target[k] - y;
-                let v = variance[k] + floor;
+                let v = precisions[k];
                 let weighted = e * e / v;
                 squares[k] = e * e;
                 terms[k] = -0.5 * (LN_2PI + terms[k] + weighted);
