@@ -8,7 +8,7 @@ use scrnn::engine::{Engine, InstructionSet};
 
 use crate::command::{completions, data, generate, inspect, recognize, report, reproduce, simulate, train};
 use crate::failure::Result;
-use crate::files::Selection;
+use scrnn_data::Selection;
 
 static VERSION: LazyLock<String> =
     LazyLock::new(|| format!("{} (instruction set {})", env!("CARGO_PKG_VERSION"), InstructionSet::best()));

@@ -15,7 +15,7 @@ use std::path::Path;
 
 use miette::{Diagnostic, NamedSource, SourceSpan};
 
-use crate::files::{FileError, disk_help};
+use scrnn_data::{FileError, disk_help};
 
 /// How a command ended that did what it could.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -15,7 +15,8 @@ use scrnn_sim::parallel::in_parallel;
 use scrnn_sim::recording::{Heading, Joint, Recorder, Robot};
 
 use crate::failure::{Failure, Result};
-use crate::{files, source};
+use crate::source;
+use scrnn_data as files;
 
 /// Branchings of an order.
 pub const BRANCHES: usize = 5;

@@ -7,7 +7,6 @@ mod assessment;
 mod command;
 mod experiment;
 mod failure;
-mod files;
 mod history;
 mod interactions;
 mod notes;

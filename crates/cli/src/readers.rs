@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use crate::experiment::{self, Override};
-use crate::files::{Selection, parse_as};
+use scrnn_data::{Selection, parse_as};
 
 /// A data file of this name. With `resampled`, a recording's joints every twentieth of a second.
 pub fn data(name: &str, bytes: &[u8], resampled: bool) {

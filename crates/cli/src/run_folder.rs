@@ -4,7 +4,7 @@ use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
 
 use crate::failure::{Failure, Result};
-use crate::files::{self, HALF_WRITTEN};
+use scrnn_data::{self as files, HALF_WRITTEN};
 
 /// The experiment with every value explicit.
 pub const EXPERIMENT: &str = "experiment.toml";

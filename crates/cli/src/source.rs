@@ -7,7 +7,8 @@ use sha2::{Digest, Sha256};
 
 use crate::experiment::{Data, TaskName};
 use crate::failure::{Failure, Result};
-use crate::{files, interactions};
+use crate::interactions;
+use scrnn_data as files;
 
 /// Sequences in their own units.
 #[derive(Debug)]

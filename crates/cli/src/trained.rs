@@ -9,7 +9,7 @@ use serde::Deserialize;
 
 use crate::experiment::Experiment;
 use crate::failure::{Failure, Result};
-use crate::files::Selection;
+use scrnn_data::Selection;
 use crate::notes::Notes;
 use crate::run_folder::{BEST, CHECKPOINT};
 use crate::source;

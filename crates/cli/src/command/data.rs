@@ -12,7 +12,7 @@ use scrnn_sim::tutor::{self, Demonstration};
 use crate::args::Shared;
 use crate::experiment::TaskName;
 use crate::failure::{Ending, Failure, Result};
-use crate::files::{self, Field};
+use scrnn_data::{self as files, Field};
 use crate::{interactions, output, source};
 
 /// Write the sequences of the thesis' experiments

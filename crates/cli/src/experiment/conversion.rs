@@ -14,7 +14,7 @@ use super::{
     ScalingChoice, ScalingConstants, ScalingName, ScalingRanges, TaskName, Training,
 };
 use crate::failure::{Failure, Result};
-use crate::files::Selection;
+use scrnn_data::Selection;
 use crate::interactions;
 
 impl TaskName {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::page::Page;
 use crate::failure::{Failure, Result};
-use crate::files::replace;
+use scrnn_data::replace;
 
 /// The page.
 pub const PAGE: &str = "report.html";

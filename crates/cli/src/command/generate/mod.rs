@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 use crate::args::{Part, Shared};
 use crate::failure::{Ending, Failure, Result};
-use crate::files::{self, Field};
+use scrnn_data::{self as files, Field};
 use crate::output;
 use crate::trained::Trained;
 use starts::Row;

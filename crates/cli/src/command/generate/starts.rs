@@ -8,7 +8,7 @@ use scrnn::topology::Group;
 
 use super::Arguments;
 use crate::failure::{Failure, Result};
-use crate::files;
+use scrnn_data as files;
 use crate::trained::Trained;
 
 /// One sequence to generate.

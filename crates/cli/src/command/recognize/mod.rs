@@ -22,7 +22,7 @@ use serde::Serialize;
 use crate::args::{Part, Shared};
 use crate::command::generate::unit_names;
 use crate::failure::{Ending, Failure, Result};
-use crate::files::{self, Field};
+use scrnn_data::{self as files, Field};
 use crate::output;
 use crate::table::Table;
 use crate::trained::Trained;

@@ -14,7 +14,7 @@ use serde_json::json;
 use crate::args::Shared;
 use crate::command::recognize::{Latency, RegressionArguments};
 use crate::failure::{Ending, Failure, Result};
-use crate::files::{self, Field};
+use scrnn_data::{self as files, Field};
 use crate::interactions::{BRANCHES, Film};
 use crate::output;
 use crate::table::Table;

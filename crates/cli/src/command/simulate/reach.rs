@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::args::Shared;
 use crate::experiment::Experiment;
 use crate::failure::{Ending, Failure, Result};
-use crate::files;
+use scrnn_data as files;
 use crate::output;
 use crate::table::Table;
 use crate::trained::Trained;

@@ -8,7 +8,7 @@ use scrnn_sim::interaction::{CHANNELS, InteractionOptions, random_order, record}
 use crate::command::reproduce::preset::{INTERACTION_NARROW, INTERACTION_WIDE, Kind, Preset};
 use crate::experiment::{Data, Experiment, Override, ScalingChoice, ScalingName};
 use crate::failure::Result;
-use crate::files::{self, Field};
+use scrnn_data::{self as files, Field};
 use crate::interactions::{self, BRANCHES};
 
 /// Networks that learn under the same condition.

@@ -7,7 +7,7 @@ use mcap::records::MessageHeader;
 use mcap::{WriteOptions, Writer};
 
 use super::*;
-use crate::files::error::FileError;
+use crate::error::FileError;
 
 /// Messages as topic, nanoseconds and text.
 fn recording(options: WriteOptions, messages: &[(&str, u64, String)]) -> Vec<u8> {
