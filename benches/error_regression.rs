@@ -1,7 +1,7 @@
 //! What a robot waits for: one control step of error regression.
 //!
 //! ```text
-//! cargo bench -p scrnn --bench error_regression [-- [--only 30] [--json] [--rounds 300] [--instruction-set avx2]]
+//! cargo bench -p scrnn-checks --bench error_regression [-- [--only 30] [--json] [--rounds 300] [--instruction-set avx2]]
 //! ```
 //!
 //! An S-CTRNN of 60 units on 2 channels regresses 100 times over windows of 10, 30 and 100 steps; an S-MTRNN as in the

@@ -1,7 +1,7 @@
 //! Epochs as shares of the machine's peak, beside the plain nalgebra path, and how their cost grows.
 //!
 //! ```text
-//! cargo bench -p scrnn --bench share_of_peak
+//! cargo bench -p scrnn-checks --bench share_of_peak
 //!     [-- [--only lissajous|grid|steps] [--json] [--rounds 5] [--instruction-set avx2]]
 //! ```
 //!
@@ -26,8 +26,8 @@ use scrnn::engine::InstructionSet;
 use scrnn::initialization::initialize;
 use scrnn::kernels::padded;
 use scrnn::learning::{Control, EpochReport, Learner};
-use scrnn::tasks::lissajous;
 use scrnn::topology::Topology;
+use scrnn_tasks::lissajous;
 use serde_json::{Value, json};
 use training::{Training, waves};
 

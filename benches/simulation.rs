@@ -2,7 +2,7 @@
 //! six seconds of simulated time.
 //!
 //! ```text
-//! cargo bench -p scrnn-sim --bench simulation
+//! cargo bench -p scrnn-checks --bench simulation
 //! ```
 //!
 //! Throughput is in simulated seconds a second, so that it is how many times faster than real time the loop runs.

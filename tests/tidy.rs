@@ -192,11 +192,12 @@ fn tests(sources: &[Text]) -> BTreeSet<&str> {
 }
 
 /// Whether `name`, e.g. `kernels::panels::multiply` or `forward::Plain::step`, is defined in the file of its module.
-/// A name that begins with `cli::` is the program's.
+/// A name that begins with that of a folder of crates/, e.g. `tasks::`, is of that crate.
 fn is_defined(name: &str, sources: &[Text]) -> bool {
-    let (folder, name) = match name.strip_prefix("cli::") {
-        Some(name) => ("crates/cli/src", name),
-        None => ("crates/scrnn/src", name),
+    let elsewhere = ["cli", "data", "pages", "report", "reproduce", "run", "sim", "tasks"];
+    let (folder, name) = match name.split_once("::") {
+        Some((place, name)) if elsewhere.contains(&place) => (format!("crates/{place}/src"), name),
+        _ => ("crates/scrnn/src".to_owned(), name),
     };
     let mut parts: Vec<&str> = name.split("::").collect();
     let function = parts.pop().unwrap_or_default();

@@ -83,7 +83,7 @@
 //! |---|---|---|
 //! | [`topology`], [`parameters`], [`network`] | groups of context units, weights and biases, both together | 2.5, 2.10 |
 //! | [`initial_states`], [`initialization`] | u_0 of each sequence and their mean; random starting values | 2.6.1, 2.7 |
-//! | [`dataset`], [`scaling`], [`tasks`] | sequences, their way into the network's range, the thesis' data | 2.6.1, 4.2, 3 |
+//! | [`dataset`], [`scaling`] | sequences, and their way into the network's range | 2.6.1, 4.2 |
 //! | [`kernels`], [`engine`] | products, tanh and exp in SIMD; instruction set and threads | |
 //! | [`forward`], [`likelihood`] | the dynamics and their score, each with a plain reference | 2.5, 2.6 |
 //! | [`learning`] | momentum ascent, its adaptive rate, Adam; the loop with its observer | 2.6.2, D.1 |
@@ -120,7 +120,6 @@ pub mod network;
 pub mod parameters;
 pub mod recognition;
 pub mod scaling;
-pub mod tasks;
 pub mod topology;
 
 mod backward;

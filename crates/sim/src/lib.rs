@@ -8,6 +8,7 @@ pub mod agent;
 pub mod camera;
 pub mod channels;
 pub mod error;
+pub mod film;
 pub mod follower;
 pub mod gaze;
 pub mod interaction;

@@ -4,16 +4,16 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use scrnn::tasks::Task;
+use scrnn_run::source;
 use scrnn_sim::reaching::PERIOD;
 use scrnn_sim::reaching_recording::{Look, ReachingRecording};
 use scrnn_sim::tutor::{self, Demonstration};
+use scrnn_tasks::{Task, TaskName, interact, make};
 
-use crate::args::Shared;
-use crate::experiment::TaskName;
-use crate::failure::{Ending, Failure, Result};
+use crate::args::{self, Shared};
+use crate::output;
 use scrnn_data::{self as files, Field};
-use crate::{interactions, output, source};
+use scrnn_run::failure::{Ending, Failure, Result};
 
 /// Write the sequences of the thesis' experiments
 ///
@@ -32,6 +32,7 @@ Examples:
   scrnn data interact --sequences 1 --out world.mcap     a recording to watch")]
 pub struct Arguments {
     /// Which sequences
+    #[arg(value_parser = args::task_names())]
     task: TaskName,
     /// Seed of the noise
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -65,7 +66,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     match (arguments.task, film) {
         (TaskName::Reach, _) => return reach(arguments, size, shared),
         (TaskName::Interact, Some(path)) => {
-            interactions::film(path, size, arguments.seed)?;
+            files::replace(path, &interact::film(size, arguments.seed)?)?;
             return Ok(Ending::Done);
         }
         (task, Some(path)) => {
@@ -74,7 +75,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         }
         (_, None) => {}
     }
-    let Task { data, means, variances } = source::make(arguments.task, size, arguments.seed)?;
+    let Task { data, means, variances } = make(arguments.task, size, arguments.seed, shared.engine()?.threads())?;
     let samples = [Field { name: "", data: &data }];
     match &arguments.out {
         Some(path) => files::write(path, &samples)?,

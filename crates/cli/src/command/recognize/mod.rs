@@ -21,12 +21,12 @@ use serde::Serialize;
 
 use crate::args::{Part, Shared};
 use crate::command::generate::unit_names;
-use crate::failure::{Ending, Failure, Result};
-use scrnn_data::{self as files, Field};
 use crate::output;
-use crate::table::Table;
-use crate::trained::Trained;
 use online::{How, Online};
+use scrnn_data::{self as files, Field};
+use scrnn_report::Table;
+use scrnn_run::failure::{Ending, Failure, Result};
+use scrnn_run::trained::Trained;
 
 /// How many of the learned sequences the table names.
 const NAMED: usize = 3;
@@ -186,7 +186,7 @@ fn options(arguments: &Arguments, trained: &Trained) -> RecognitionOptions {
     if let Some(rate) = arguments.rate {
         options.rate = rate;
     }
-    let variance = |notes: &crate::notes::Notes| notes.experiment["network"]["initial_state_variance"].as_f64();
+    let variance = |notes: &scrnn_run::notes::Notes| notes.experiment["network"]["initial_state_variance"].as_f64();
     if let Some(variance) = trained.notes.as_ref().and_then(variance) {
         options.initial_state_variance = variance;
     }

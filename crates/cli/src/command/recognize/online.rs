@@ -15,11 +15,11 @@ use super::regression::RegressionArguments;
 use super::stream::{Arrival, Stream};
 use crate::args::{Part, Shared};
 use crate::command::generate::unit_names;
-use crate::failure::{Ending, Failure, Result};
-use scrnn_data::{self as files, Field};
 use crate::output;
-use crate::table::Table;
-use crate::trained::Trained;
+use scrnn_data::{self as files, Field};
+use scrnn_report::Table;
+use scrnn_run::failure::{Ending, Failure, Result};
+use scrnn_run::trained::Trained;
 
 /// How to follow.
 #[derive(Debug, Args)]

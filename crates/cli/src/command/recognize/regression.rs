@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use scrnn::error_regression::{Ascent, ErrorRegressionOptions};
 
 use super::deadline::Deadline;
-use crate::failure::{Failure, Result};
+use scrnn_run::failure::{Failure, Result};
 
 /// Options of error regression.
 #[derive(Debug, Args)]

@@ -13,12 +13,13 @@ use serde_json::json;
 
 use crate::args::Shared;
 use crate::command::recognize::{Latency, RegressionArguments};
-use crate::failure::{Ending, Failure, Result};
-use scrnn_data::{self as files, Field};
-use crate::interactions::{BRANCHES, Film};
 use crate::output;
-use crate::table::Table;
-use crate::trained::Trained;
+use scrnn_data::{self as files, Field};
+use scrnn_report::Table;
+use scrnn_run::failure::{Ending, Failure, Result};
+use scrnn_run::trained::Trained;
+use scrnn_sim::film::Film;
+use scrnn_tasks::interact::BRANCHES;
 
 /// Two robots: the network follows the other robot's object with its arm
 ///
@@ -126,13 +127,13 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
             failed = film.frame(interaction, &moment.sensed, mean.as_deref().map(|mean| (mean, variance))).err();
         })?;
         if let Some(failure) = failed {
-            return Err(failure);
+            return Err(failure.into());
         }
         let (order, branches) = (letters(&order), followed.branches.clone());
         trials.push(Trial { order, initial_state, branches, latency: deadline.latency(), followed });
     }
     if let (Some(film), Some(path)) = (film, &arguments.mcap) {
-        film.write(path)?;
+        files::replace(path, &film.finish()?)?;
     }
     if let Some(path) = &arguments.out {
         write(path, &trained, &trials)?;

@@ -14,12 +14,12 @@ use scrnn_sim::world::WorldOptions;
 use serde::{Deserialize, Serialize};
 
 use crate::args::Shared;
-use crate::experiment::Experiment;
-use crate::failure::{Ending, Failure, Result};
-use scrnn_data as files;
 use crate::output;
-use crate::table::Table;
-use crate::trained::Trained;
+use scrnn_data as files;
+use scrnn_report::Table;
+use scrnn_run::experiment::Experiment;
+use scrnn_run::failure::{Ending, Failure, Result};
+use scrnn_run::trained::Trained;
 
 /// Let a network that learned to reach touch the sphere
 ///

@@ -1,0 +1,114 @@
+//! Error regression over window, iterations, optimiser and rate: which settings are safe for every network?
+
+use scrnn::error_regression::{Ascent, ErrorRegressionOptions};
+use scrnn::evaluation::mean_and_deviation;
+use serde::Serialize;
+
+use super::trials::Subject;
+use scrnn_run::failure::Result;
+
+/// Of the 32 recordings, every how many-th is taken: all settings have to be run on all networks.
+const EVERY: usize = 4;
+
+/// One setting.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Setting {
+    /// For the eye.
+    pub name: String,
+    /// The options.
+    pub options: ErrorRegressionOptions,
+}
+
+/// A setting on all networks.
+#[derive(Debug, Clone, Serialize)]
+pub struct Scanned {
+    /// Which.
+    pub setting: String,
+    /// W.
+    pub window: usize,
+    /// Updates for each sample.
+    pub iterations: usize,
+    /// Mean reaction time over networks.
+    pub mean: f64,
+    /// Its standard deviation.
+    pub deviation: f64,
+    /// That of the slowest network.
+    pub worst: f64,
+    /// Each network's.
+    pub values: Vec<f64>,
+    /// Median milliseconds of a control step.
+    pub milliseconds: f64,
+}
+
+/// What is tried: the default, and departures from it in one way each.
+pub fn settings(channels: usize) -> Vec<Setting> {
+    let default = ErrorRegressionOptions::new(channels);
+    let of = |name: &str, change: &dyn Fn(&mut ErrorRegressionOptions)| {
+        let mut options = default.clone();
+        change(&mut options);
+        Setting { name: name.to_owned(), options }
+    };
+    let momentum = |rate: f64, max_norm: Option<f64>| {
+        move |options: &mut ErrorRegressionOptions| {
+            (options.ascent, options.max_norm) = (Ascent::Momentum { rate, momentum: 0.9 }, max_norm);
+        }
+    };
+    let adam = |rate: f64| {
+        move |options: &mut ErrorRegressionOptions| (options.ascent, options.max_norm) = (Ascent::Adam { rate }, None)
+    };
+    let thesis = 1e-4 / channels as f64;
+    vec![
+        of("default", &|_| {}),
+        of("window 5", &|options| options.window = 5),
+        of("window 10", &|options| options.window = 10),
+        of("window 20", &|options| options.window = 20),
+        of("window 30", &|options| options.window = 30),
+        of("window 70", &|options| options.window = 70),
+        of("1 step", &|options| options.iterations = 1),
+        of("3 steps", &|options| options.iterations = 3),
+        of("30 steps", &|options| options.iterations = 30),
+        of("momentum, the thesis' rate", &momentum(thesis, None)),
+        of("momentum, 10 times that", &momentum(10.0 * thesis, None)),
+        of("momentum, 100 times that", &momentum(100.0 * thesis, None)),
+        of("momentum, 10 times that, window 20", &|options| {
+            momentum(10.0 * thesis, None)(options);
+            options.window = 20;
+        }),
+        of("momentum 1e-3, gradient to 10", &momentum(1e-3, Some(10.0))),
+        of("momentum 1e-3, gradient to 100", &momentum(1e-3, Some(100.0))),
+        of("momentum 1e-2, gradient to 1", &momentum(1e-2, Some(1.0))),
+        of("momentum 1e-2, gradient to 20", &momentum(1e-2, Some(20.0))),
+        of("Adam 0.02", &adam(0.02)),
+        of("Adam 0.1", &adam(0.1)),
+    ]
+}
+
+/// One network's mean reaction time and median milliseconds for each setting.
+pub fn one(subject: &Subject<'_>, state: &[f64]) -> Result<Vec<(f64, f64)>> {
+    let settings = settings(subject.data.channels().len());
+    let run = |setting: &Setting| {
+        let found = subject.regressed(state, &subject.regression(setting.options.clone()), EVERY)?;
+        Ok((found.reactions.mean, found.milliseconds[0]))
+    };
+    settings.iter().map(run).collect()
+}
+
+/// All networks together.
+pub fn all(channels: usize, networks: &[&Vec<(f64, f64)>]) -> Vec<Scanned> {
+    let together = |(k, setting): (usize, Setting)| {
+        let values: Vec<f64> = networks.iter().map(|network| network[k].0).collect();
+        let times: Vec<f64> = networks.iter().map(|network| network[k].1).collect();
+        let (mean, deviation) = mean_and_deviation(&values);
+        Scanned {
+            setting: setting.name,
+            window: setting.options.window,
+            iterations: setting.options.iterations,
+            mean,
+            deviation,
+            worst: values.iter().copied().fold(0.0, f64::max),
+            milliseconds: mean_and_deviation(&times).0,
+            values,
+        }
+    };
+    settings(channels).into_iter().enumerate().map(together).collect()
+}
