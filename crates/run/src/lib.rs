@@ -7,7 +7,7 @@
 //! | [`training`] | one training, from a resolved experiment to a run folder: begun, gone on with, or begun anew |
 //! | [`verdict`] | what a training came to, in words and as JSON |
 //! | [`run_folder`], [`history`], [`notes`] | what a training leaves behind |
-//! | [`trained`] | a trained network as it is found again |
+//! | [`trained`], [`channels`] | a trained network as it is found again, and new data brought to its channels by name |
 //! | [`assessment`], [`truth`] | how well it predicts, beside simple models and what is known of the noise |
 //! | [`messages`], [`interrupt`] | how news and progress leave, and how a person's wish to stop comes in |
 //! | [`failure`] | what ends a request early, and with which exit code |
@@ -15,6 +15,7 @@
 //! Nothing here knows a terminal or a command line: progress and messages are handed in.
 
 pub mod assessment;
+pub mod channels;
 pub mod experiment;
 pub mod failure;
 pub mod history;

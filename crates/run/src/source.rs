@@ -1,9 +1,12 @@
 //! Where an experiment's sequences come from: a task, which knows the truth, or files.
 
+use std::path::Path;
+
 use scrnn::dataset::Dataset;
 use scrnn_sim::tutor::{self, Demonstration, Tutoring};
 use sha2::{Digest, Sha256};
 
+use crate::channels;
 use crate::experiment::Data;
 use crate::failure::{Failure, Result};
 use scrnn_data as files;
@@ -66,20 +69,12 @@ pub fn load(data: &Data, threads: usize) -> Result<Source> {
         [(_, only)] => only.clone(),
         several => {
             let (first, channels) = match several.first() {
-                Some((path, set)) => (path.display(), set.channels().to_vec()),
+                Some((path, set)) => (path.display().to_string(), set.channels().to_vec()),
                 None => return Err(Failure::input("the experiment names no file", "add one to `data.files`")),
             };
             let mut sequences = Vec::new();
-            for (path, set) in several {
-                if set.channels() != channels {
-                    let message = format!(
-                        "the channels of {} are {}, those of {first} are {}",
-                        path.display(),
-                        set.channels().join(", "),
-                        channels.join(", ")
-                    );
-                    return Err(Failure::input(message, "files that are learned together need the same channels"));
-                }
+            for (path, set) in sets {
+                let set = alike(set, &channels, (path, &first))?;
                 let stem = path.file_stem().unwrap_or_default().to_string_lossy();
                 for sequence in set.sequences() {
                     let mut sequence = sequence.clone();
@@ -91,6 +86,23 @@ pub fn load(data: &Data, threads: usize) -> Result<Source> {
         }
     };
     Ok(Source::of(data))
+}
+
+/// `set`, from the file at `path`, on the channels of the first file: by their names, whatever their order.
+fn alike(set: Dataset, channels: &[String], (path, first): (&Path, &str)) -> Result<Dataset> {
+    if set.channels() == channels {
+        return Ok(set);
+    }
+    if channels::nameless(set.channels()) || channels::by_name(set.channels(), channels).is_err() {
+        let message = format!(
+            "the channels of {} are {}, those of {first} are {}",
+            path.display(),
+            set.channels().join(", "),
+            channels.join(", ")
+        );
+        return Err(Failure::input(message, "files that are learned together need the same channels, by name"));
+    }
+    channels::matched(set, channels, &path.display().to_string())
 }
 
 /// How the robot is taught: so many demonstrations of so many samples.

@@ -7,6 +7,7 @@ use scrnn::dataset::Dataset;
 use scrnn::network::Network;
 use serde::Deserialize;
 
+use crate::channels;
 use crate::experiment::Experiment;
 use crate::failure::{Failure, Result};
 use crate::notes::Notes;
@@ -79,28 +80,28 @@ impl Trained {
         Ok(data)
     }
 
-    /// Checks that `data` have the channels that were learned, and are numbers that the network can be told.
-    pub fn check_channels(&self, data: &Dataset, path: &Path) -> Result<()> {
+    /// `data`, from the file at `path`, on the channels that were learned and in their order (see [`channels::matched`]),
+    /// checked to be numbers that the network can be given.
+    ///
+    /// # Errors
+    /// [`Failure::Input`] for channels that do not match, and for samples far outside of what was learned.
+    pub fn fitted(&self, data: Dataset, path: &Path) -> Result<Dataset> {
         let learned = &self.checkpoint.channels;
-        if data.channels().len() == learned.len() {
-            let scaled = self.checkpoint.scaling.apply(data);
-            let n = learned.len();
-            for sequence in scaled.sequences() {
-                if let Some(at) = sequence.values().iter().position(|value| value.abs() >= TOO_FAR || value.is_nan()) {
-                    let (name, step, channel) = (&sequence.name, at / n + 1, &learned[at % n]);
-                    let message = format!(
-                        "{}: sequence {name}, step {step}, channel {channel} lies {:e} times as far out as anything that was learned",
-                        path.display(),
-                        sequence.values()[at].abs()
-                    );
-                    return Err(Failure::input(message, "are these data in the units of those that were learned?"));
-                }
+        let data = channels::matched(data, learned, &path.display().to_string())?;
+        let scaled = self.checkpoint.scaling.apply(&data);
+        let n = learned.len();
+        for sequence in scaled.sequences() {
+            if let Some(at) = sequence.values().iter().position(|value| value.abs() >= TOO_FAR || value.is_nan()) {
+                let (name, step, channel) = (&sequence.name, at / n + 1, &learned[at % n]);
+                let message = format!(
+                    "{}: sequence {name}, step {step}, channel {channel} lies {:e} times as far out as anything that was learned",
+                    path.display(),
+                    sequence.values()[at].abs()
+                );
+                return Err(Failure::input(message, "are these data in the units of those that were learned?"));
             }
-            return Ok(());
         }
-        let count = |channels: &[String]| format!("{} ({})", channels.len(), channels.join(", "));
-        let message = format!("{} has {} channels", path.display(), count(data.channels()));
-        Err(Failure::input(message, format!("the network learned {}", count(learned))))
+        Ok(data)
     }
 }
 

@@ -40,7 +40,7 @@ pub fn rows((arguments, trained): (&Arguments, &Trained), threads: usize, sensin
     let mut rows = match (&arguments.data, sensing) {
         (Some(path), _) => {
             let data = files::read_part(path, &arguments.part.of(path, trained.selection()))?;
-            trained.check_channels(&data, path)?;
+            let data = trained.fitted(data, path)?;
             pair(states, &data, checkpoint)?
         }
         (None, true) => {

@@ -141,8 +141,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     let trained = Trained::open(&arguments.run, arguments.best)?;
     let checkpoint = &trained.checkpoint;
     let part = arguments.part.of(&arguments.data, trained.selection());
-    let data = files::read_part(&arguments.data, &part)?;
-    trained.check_channels(&data, &arguments.data)?;
+    let data = trained.fitted(files::read_part(&arguments.data, &part)?, &arguments.data)?;
     data.check_for(&checkpoint.topology)?;
     let delay = checkpoint.topology.delay();
     if let Some(observed) = arguments.observed.filter(|observed| *observed <= delay) {

@@ -225,10 +225,9 @@ pub fn run(
         }
         return stream(online, how, &trained, as_json, shared);
     }
-    let data = files::read_part(data, &part.of(data, trained.selection())).map_err(Failure::from).and_then(|set| {
-        trained.check_channels(&set, data)?;
-        Ok(set)
-    })?;
+    let data = files::read_part(data, &part.of(data, trained.selection()))
+        .map_err(Failure::from)
+        .and_then(|set| trained.fitted(set, data))?;
     let mut followed = Vec::new();
     for sequence in data.sequences() {
         followed.push(follow(online, how, &trained, sequence, shared)?);
