@@ -52,7 +52,12 @@ fn formula(topology: &Topology, sequences: usize, steps: usize, batches: usize, 
     let weights = 8 * (rows * (c + i) + up(c) * (c + n_out));
     let each_sequence = 8 * c * 2 * 5 + 64;
     let each_of_a_batch = 8 * c * 3 + 8 * i * 4;
-    records * record + (blocks + 1) * gradient + weights + 11 * parameters + sequences * each_sequence + batch * each_of_a_batch
+    records * record
+        + (blocks + 1) * gradient
+        + weights
+        + 11 * parameters
+        + sequences * each_sequence
+        + batch * each_of_a_batch
 }
 
 #[test]
@@ -71,7 +76,7 @@ fn a_training_takes_the_bytes_that_are_promised_whatever_the_number_of_batches()
             let mut learner = Learner::new(network, states, &data, plan, &engine).unwrap();
             let _ = learner.run(&mut until(2));
             let taken = region.change();
-            let taken = taken.bytes_allocated as f64 + taken.bytes_reallocated as f64 - taken.bytes_deallocated as f64;
+            let taken = taken.bytes_allocated as f64 - taken.bytes_deallocated as f64;
             let promised = formula(&topology, sequences, steps, batches, threads) as f64;
             println!("{threads} threads, {batches} batches: {taken} bytes, {promised} by the formula");
             assert!((taken / promised - 1.0).abs() < 0.1, "{threads} threads, {batches} batches: {taken}, {promised}");
@@ -99,7 +104,8 @@ fn after_the_first_epochs_two_threads_allocate_nothing_either() {
         let _ = learner.run(&mut until(300));
         // The queue of the thread pool takes a block for each 63 calls, of which an epoch makes one for each batch.
         let calls = if matches!(optimiser, Optimiser::Adam(Adam { batch_size: 7, .. })) { 3 * 300 } else { 300 };
-        let count = region.change().allocations;
+        let change = region.change();
+        let count = change.allocations + change.reallocations;
         assert!(count <= calls / 63 + 1, "{optimiser:?}: {count} allocations");
     }
 }

@@ -46,6 +46,9 @@ pub struct EpochReport {
     pub gradient_norm: f64,
     /// How often the training was brought back so far.
     pub recoveries: u64,
+    /// Whether all tries of the adaptive rate (D.1) failed: the update was withdrawn, and the network is that of the epoch before. The
+    /// next one tries at the rate that is left. (`false` in the first report after a training was taken up again.)
+    pub withdrawn: bool,
 }
 
 /// Watches a training, and can stop it.
@@ -137,6 +140,8 @@ pub struct Learner {
     lbfgs: Option<LbfgsRule>,
     /// Whether `batches` already holds what the next report says.
     evaluated: bool,
+    /// Whether the last update was withdrawn for good.
+    withdrawn: bool,
 }
 
 impl Learner {
@@ -197,7 +202,18 @@ impl Learner {
         let state = State { network, initial_states, rule, epoch: 0 };
         let guard = (plan.on_divergence == OnDivergence::Recover).then(|| Guard::new(&state));
         let last_good = state.clone();
-        Ok(Self { last_good, state, guard, plan, data: data.clone(), terms, batches, lbfgs, evaluated: false })
+        Ok(Self {
+            last_good,
+            state,
+            guard,
+            plan,
+            data: data.clone(),
+            terms,
+            batches,
+            lbfgs,
+            evaluated: false,
+            withdrawn: false,
+        })
     }
 
     /// Goes on from a checkpoint, of which `new` got the network and the initial states.
@@ -384,13 +400,14 @@ impl Learner {
             rate_initial,
             gradient_norm: self.batches.gradient_norm,
             recoveries: self.recoveries(),
+            withdrawn: self.withdrawn,
         }
     }
 
     fn update(&mut self) {
         let refines = self.refines();
         let State { network, initial_states, rule, epoch } = &mut self.state;
-        self.evaluated = false;
+        (self.evaluated, self.withdrawn) = (false, false);
         if let Some(lbfgs) = self.lbfgs.as_mut().filter(|_| refines) {
             self.evaluated = lbfgs.ascend(&mut self.batches, &mut network.parameters, initial_states);
             return;
@@ -413,13 +430,13 @@ impl Learner {
         }
     }
 
-    /// Accepts the tentative update, or withdraws it and tries a lower rate (D.1). The last good state holds the
-    /// parameters before the update.
+    /// Accepts the tentative update, or withdraws it and tries a lower rate (D.1). Every try is judged; where the last one fails too,
+    /// nothing moves in this epoch. The last good state holds the parameters before the update.
     fn adapt(&mut self) {
         let before = self.batches.squared_error();
         let Rule::Momentum(rule) = &self.state.rule else { return };
         let Some(options) = rule.options.adaptive.clone() else { return };
-        for _ in 1..options.max_tries {
+        for tries_left in (0..options.max_tries).rev() {
             self.evaluated = false;
             self.evaluate();
             let ratio = self.batches.squared_error() / before;
@@ -435,8 +452,10 @@ impl Learner {
             network.parameters.as_mut_slice().copy_from_slice(good.network.parameters.as_slice());
             initial_states.values_mut().copy_from_slice(good.initial_states.values());
             initial_states.mean_mut().copy_from_slice(good.initial_states.mean());
-            rule.apply(&mut network.parameters, initial_states);
+            if tries_left > 0 {
+                rule.apply(&mut network.parameters, initial_states);
+            }
         }
-        self.evaluated = false;
+        (self.evaluated, self.withdrawn) = (false, true);
     }
 }
