@@ -335,7 +335,10 @@ fn score<S: Simd>(
 fn take_targets(packed: &Packed, block: &Block, sequences: &[Sequence], steps: Range<usize>, targets: &mut [f64]) {
     let (n, n_x) = (block.columns(), packed.n_x);
     for (column, (&sequence, &length)) in block.sequences.iter().zip(&block.lengths).enumerate() {
-        let own = steps.start + packed.delay..steps.end.min(length).max(steps.start) + packed.delay;
+        if length <= steps.start {
+            break;
+        }
+        let own = steps.start + packed.delay..steps.end.min(length) + packed.delay;
         let samples = &sequences[sequence].values()[own.start * n_x..own.end * n_x];
         for (sample, targets) in samples.chunks_exact(n_x).zip(targets.chunks_exact_mut(n * n_x)) {
             copy_few(&mut targets[column * n_x..(column + 1) * n_x], sample);
