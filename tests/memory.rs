@@ -46,7 +46,9 @@ fn formula(topology: &Topology, sequences: usize, steps: usize, batches: usize, 
     };
     let records = threads.min(blocks);
     let columns = batch.div_ceil(blocks);
-    let record = 8 * columns * steps * (odd(rows + i + 1) + n_out) + (448 << 10);
+    let (s, d) = (odd(rows + i + 1), odd(rows));
+    let segment = steps.min((448 << 10) / (8 * columns * (s + d)));
+    let record = 8 * columns * steps * (s + n_out) + 8 * columns * segment * (d + 4 * i);
     let gradient = 8 * (c + i + 1) * rows;
     let parameters = 8 * (c * (c + i + n_out + 1) + n_out);
     let weights = 8 * (rows * (c + i) + up(c) * (c + n_out));
@@ -79,7 +81,7 @@ fn a_training_takes_the_bytes_that_are_promised_whatever_the_number_of_batches()
             let taken = taken.bytes_allocated as f64 - taken.bytes_deallocated as f64;
             let promised = formula(&topology, sequences, steps, batches, threads) as f64;
             println!("{threads} threads, {batches} batches: {taken} bytes, {promised} by the formula");
-            assert!((taken / promised - 1.0).abs() < 0.1, "{threads} threads, {batches} batches: {taken}, {promised}");
+            assert!((taken / promised - 1.0).abs() < 0.05, "{threads} threads, {batches} batches: {taken}, {promised}");
         }
     }
 }
@@ -100,12 +102,15 @@ fn after_the_first_epochs_two_threads_allocate_nothing_either() {
         let plan = Plan { epochs: 1000, optimiser: optimiser.clone(), ..Plan::default() };
         let mut learner = Learner::new(network, states, &data, plan, &engine).unwrap();
         let _ = learner.run(&mut until(3));
-        let region = Region::new(ALLOCATOR);
-        let _ = learner.run(&mut until(300));
-        // The queue of the thread pool takes a block for each 63 calls, of which an epoch makes one for each batch.
-        let calls = if matches!(optimiser, Optimiser::Adam(Adam { batch_size: 7, .. })) { 3 * 300 } else { 300 };
-        let change = region.change();
-        let count = change.allocations + change.reallocations;
+        // The test's own surroundings allocate now and then: the least of three counts. The queue of the thread pool takes a block for
+        // each 63 calls, of which an epoch makes one for each batch.
+        let count = (1..=3).map(|nth| {
+            let region = Region::new(ALLOCATOR);
+            let _ = learner.run(&mut until(3 + 200 * nth));
+            region.change().allocations + region.change().reallocations
+        });
+        let count = count.min().unwrap();
+        let calls = if matches!(optimiser, Optimiser::Adam(Adam { batch_size: 7, .. })) { 3 * 200 } else { 200 };
         assert!(count <= calls / 63 + 1, "{optimiser:?}: {count} allocations");
     }
 }
