@@ -1,10 +1,10 @@
-//! What is promised to allocate nothing allocates nothing.
+//! What is promised to allocate nothing allocates nothing. (On several threads: `memory.rs`.)
 
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::engine::{Engine, InstructionSet};
 use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions};
 use scrnn::initialization::initialize;
-use scrnn::learning::{Adam, Control, EpochReport, Lbfgs, Learner, Momentum, Optimiser, Plan};
+use scrnn::learning::{Adam, Control, EpochReport, Lbfgs, Learner, Momentum, Optimiser, Plan, PriorStep};
 use scrnn::topology::{Group, Prediction, Topology};
 
 fn wave(steps: usize) -> Vec<f64> {
@@ -39,6 +39,7 @@ fn after_the_first_epochs_an_epoch_allocates_nothing() {
     for (recompute, optimiser, share) in [
         (false, momentum(), 0.0),
         (true, momentum(), 0.0),
+        (false, Optimiser::Momentum(Momentum { prior: PriorStep::Thesis, ..Momentum::default() }), 0.0),
         (false, in_batches.clone(), 0.0),
         // L-BFGS from the start, and from the tenth of twenty epochs on.
         (false, momentum(), 1.0),

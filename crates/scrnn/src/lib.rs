@@ -86,6 +86,7 @@
 //! | [`dataset`], [`scaling`] | sequences, and their way into the network's range | 2.6.1, 4.2 |
 //! | [`kernels`], [`engine`] | products, tanh and exp in SIMD; instruction set and threads | |
 //! | [`forward`], [`likelihood`] | the dynamics and their score, each with a plain reference | 2.5, 2.6 |
+//! | [`objective`] | the seam: what is climbed, and who computes it | 2.6 |
 //! | [`learning`] | momentum ascent, its adaptive rate, Adam; the loop with its observer | 2.6.2, D.1 |
 //! | [`generation`], [`recognition`] | open, closed and mixed loop; the search for u_0 | 2.8, 2.9 |
 //! | [`error_regression`] | recognition while samples arrive, over a sliding window | 2.10.2 |
@@ -117,6 +118,7 @@ pub mod kernels;
 pub mod learning;
 pub mod likelihood;
 pub mod network;
+pub mod objective;
 pub mod parameters;
 pub mod recognition;
 pub mod scaling;
@@ -124,7 +126,6 @@ pub mod topology;
 
 mod backward;
 mod batch;
-mod objective;
 mod packed;
 mod stepper;
 mod trajectory;

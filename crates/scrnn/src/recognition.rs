@@ -9,13 +9,11 @@ use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::batch::Item;
 use crate::dataset::Dataset;
-use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::initial_states::InitialStates;
 use crate::network::Network;
-use crate::objective::{Objective, Want};
+use crate::objective::{Backend, Evaluation, Objective, Request, Run, Want};
 
 /// A kind of starting point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -137,7 +135,7 @@ pub fn recognize(
     learned: &InitialStates,
     data: &Dataset,
     options: &RecognitionOptions,
-    engine: &Engine,
+    backend: &dyn Backend,
 ) -> Result<Vec<Recognition>> {
     check(network, data, options)?;
     let (topology, n_c) = (&network.topology, network.topology.context_units());
@@ -145,25 +143,23 @@ pub fn recognize(
         let length = data.sequences()[s].len();
         options.observed.map_or(length, |observed| observed.min(length)) - topology.delay()
     };
-    let item = |s: usize| Item { samples: data.sequences()[s].values(), steps: steps(s) };
     let per_step = |s: usize| (steps(s) * topology.channels()) as f64;
     let sequences = data.sequences().len();
 
+    let mut objective = backend.objective(&Request::new(topology, data))?;
+    objective.set_parameters(&network.parameters);
+    let mut found = Evaluation::new(topology);
+
     // Every learned initial state on every sequence.
     let mut rankings = vec![Vec::new(); sequences];
-    if learned.sequences() > 0 {
-        let items: Vec<_> = (0..sequences).flat_map(|s| vec![item(s); learned.sequences()]).collect();
-        let mut objective = Objective::new(topology, &items, false, engine);
-        objective.set_parameters(&network.parameters);
-        objective.evaluate(&learned.values().repeat(sequences), Want::Score);
-        for (s, ranking) in rankings.iter_mut().enumerate() {
-            for sequence in 0..learned.sequences() {
-                let index = s * learned.sequences() + sequence;
-                let error = objective.squared_error[index] / (2.0 * per_step(s));
-                ranking.push(Ranked { sequence, ln_likelihood: objective.ln_likelihood[index], error });
-            }
-            ranking.sort_by(|a, b| b.ln_likelihood.total_cmp(&a.ln_likelihood));
+    for (s, ranking) in rankings.iter_mut().enumerate().filter(|_| learned.sequences() > 0) {
+        let runs = vec![Run::new(s, steps(s)); learned.sequences()];
+        objective.evaluate(&runs, learned.values(), Want::Score, &mut found);
+        for sequence in 0..learned.sequences() {
+            let error = found.squared_error[sequence] / (2.0 * per_step(s));
+            ranking.push(Ranked { sequence, ln_likelihood: found.ln_likelihood[sequence], error });
         }
+        ranking.sort_by(|a, b| b.ln_likelihood.total_cmp(&a.ln_likelihood));
     }
 
     let mut origins = Vec::new();
@@ -176,11 +172,9 @@ pub fn recognize(
             origins.push((s, start));
         }
     }
-    let items: Vec<_> = origins.iter().map(|&(s, _)| item(s)).collect();
-    let mut objective = Objective::new(topology, &items, false, engine);
-    objective.set_parameters(&network.parameters);
+    let runs: Vec<_> = origins.iter().map(|&(s, _)| Run::new(s, steps(s))).collect();
     let scales: Vec<f64> = origins.iter().map(|&(s, _)| per_step(s)).collect();
-    let best = ascend(&mut objective, learned.mean(), states, &scales, options, network);
+    let best = ascend(objective.as_mut(), &runs, learned.mean(), states, &scales, options, network);
 
     let mut results: Vec<Recognition> =
         rankings.into_iter().map(|ranking| Recognition { trials: Vec::new(), ranking }).collect();
@@ -285,7 +279,8 @@ struct Best {
 
 /// Adam on z, u_0 = mean + s z, s = min(sigma_IS, 1), as in learning.
 fn ascend(
-    objective: &mut Objective,
+    objective: &mut dyn Objective,
+    runs: &[Run],
     mean: &[f64],
     mut states: Vec<f64>,
     scales: &[f64],
@@ -304,15 +299,17 @@ fn ascend(
         ln_likelihood: vec![f64::NEG_INFINITY; count],
         squared_error: vec![f64::INFINITY; count],
     };
+    let mut found = Evaluation::new(&network.topology);
     for epoch in 0..=options.epochs {
-        objective.evaluate(&states, if epoch < options.epochs { Want::InitialStates } else { Want::Score });
+        let want = if epoch < options.epochs { Want::InitialStates } else { Want::Score };
+        objective.evaluate(runs, &states, want, &mut found);
         let phase = std::f64::consts::PI * epoch as f64 / options.epochs.max(1) as f64;
         let rate = options.rate * 0.5 * (1.0 + phase.cos());
         let correct = |beta: f64| 1.0 / (1.0 - beta.powf(epoch as f64 + 1.0));
         let (correct_first, correct_second) = (correct(beta.0), correct(beta.1));
         for (index, scale) in scales.iter().enumerate() {
             let own = index * n_c..(index + 1) * n_c;
-            let ln_likelihood = objective.ln_likelihood[index];
+            let ln_likelihood = found.ln_likelihood[index];
             if !ln_likelihood.is_finite() {
                 // Out of bounds: back to the best, at rest.
                 states[own.clone()].copy_from_slice(&best.states[own.clone()]);
@@ -322,7 +319,7 @@ fn ascend(
             }
             if ln_likelihood > best.ln_likelihood[index] {
                 best.ln_likelihood[index] = ln_likelihood;
-                best.squared_error[index] = objective.squared_error[index];
+                best.squared_error[index] = found.squared_error[index];
                 best.states[own.clone()].copy_from_slice(&states[own.clone()]);
             }
             for at in own {
@@ -331,7 +328,7 @@ fn ascend(
                     continue;
                 }
                 let pull = (states[at] - mean[i]) / variance;
-                let g = s * (objective.initial[at] - pull) / scale;
+                let g = s * (found.initial[at] - pull) / scale;
                 first[at] = beta.0 * first[at] + (1.0 - beta.0) * g;
                 second[at] = beta.1 * second[at] + (1.0 - beta.1) * g * g;
                 let step = first[at] * correct_first / ((second[at] * correct_second).sqrt() + 1e-8);
@@ -346,6 +343,7 @@ fn ascend(
 mod tests {
     use super::*;
     use crate::dataset::Sequence;
+    use crate::engine::Engine;
     use crate::generation::{Feedback, GenerationOptions, Start, generate};
     use crate::initialization::initialize;
     use crate::topology::{Group, Prediction, Topology};

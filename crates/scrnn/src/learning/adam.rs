@@ -14,7 +14,8 @@ use super::coordinates::Coordinates;
 use super::plan::Adam;
 use super::state::Fields;
 use crate::initial_states::InitialStates;
-use crate::parameters::{Block, Gradients, Parameters};
+use crate::objective::{Evaluation, Run};
+use crate::parameters::{Block, Parameters};
 use crate::topology::Topology;
 
 /// First and second moments of one list of parameters.
@@ -62,7 +63,7 @@ pub(super) struct Batch<'a> {
     pub epoch: u64,
     /// The number of this update, from 1.
     pub update: u64,
-    pub sequences: &'a [usize],
+    pub runs: &'a [Run],
     /// Their steps times the channels.
     pub terms: f64,
 }
@@ -136,11 +137,11 @@ impl AdamRule {
     pub fn ascend(
         &mut self,
         batch: &Batch<'_>,
-        gradients: &Gradients,
-        initial: &[f64],
+        evaluation: &Evaluation,
         parameters: &mut Parameters,
         states: &mut InitialStates,
     ) {
+        let Evaluation { gradients, initial, .. } = evaluation;
         let adam = self.options.clone();
         let rate = self.rate(batch.epoch);
 
@@ -162,8 +163,8 @@ impl AdamRule {
         // Each sequence is met once an epoch.
         let (met, own_rate) = (batch.epoch + 1, rate * adam.initial_state_factor);
         self.coordinates.read(states, &mut self.z);
-        for (&sequence, initial) in batch.sequences.iter().zip(initial.chunks_exact(units)) {
-            let own = sequence * units..(sequence + 1) * units;
+        for (run, initial) in batch.runs.iter().zip(initial.chunks_exact(units)) {
+            let own = run.sequence * units..(run.sequence + 1) * units;
             let z = &mut self.z[own.clone()];
             let scratch = &mut self.scratch[..units];
             for (i, (out, g)) in scratch.iter_mut().zip(initial).enumerate() {
@@ -220,9 +221,10 @@ mod tests {
         let options = Adam { rate: 0.1, warm_up: 0.0, weight_decay: 0.2, ..Adam::default() };
         let mut rule = AdamRule::new(options, &topology, &states, 10, 1.0, 10);
         // Without a gradient nothing else moves.
-        let (gradients, initial) = (Parameters::zeros(&topology), [0.0; 3]);
-        let batch = Batch { epoch: 0, update: 1, sequences: &[0], terms: 20.0 };
-        rule.ascend(&batch, &gradients, &initial, &mut network.parameters, &mut states);
+        let mut evaluation = Evaluation::new(&topology);
+        evaluation.resize(1);
+        let batch = Batch { epoch: 0, update: 1, runs: &[Run::new(0, 10)], terms: 20.0 };
+        rule.ascend(&batch, &evaluation, &mut network.parameters, &mut states);
         for block in Block::ALL {
             let expected = if block.is_bias() { 0.5 } else { 0.5 * 0.98 };
             assert!(network.parameters.block(block).iter().all(|w| (w - expected).abs() < 1e-15), "{block:?}");
@@ -235,9 +237,10 @@ mod tests {
         let (mut network, mut states) = crate::initialization::initialize(&topology, 3, 5);
         let options = Adam { rate: 0.1, warm_up: 0.0, mean_factor: 0.0, ..Adam::default() };
         let mut rule = AdamRule::new(options, &topology, &states, 10, 1.0, 10);
-        let (gradients, before) = (Parameters::zeros(&topology), states.clone());
-        let batch = Batch { epoch: 0, update: 1, sequences: &[2, 0], terms: 20.0 };
-        rule.ascend(&batch, &gradients, &[1.0, 2.0, -1.0, 5.0], &mut network.parameters, &mut states);
+        let (mut evaluation, before) = (Evaluation::new(&topology), states.clone());
+        evaluation.initial = vec![1.0, 2.0, -1.0, 5.0];
+        let batch = Batch { epoch: 0, update: 1, runs: &[Run::new(2, 10), Run::new(0, 10)], terms: 20.0 };
+        rule.ascend(&batch, &evaluation, &mut network.parameters, &mut states);
         let moved = |s: usize| [0, 1].map(|i| states.sequence(s)[i] - before.sequence(s)[i]);
         // The first step of Adam is as long as the rate, three times that of the weights, whatever the gradient.
         for (sequence, expected) in [(0, [-0.3, 0.3]), (1, [0.0, 0.0]), (2, [0.3, 0.3])] {

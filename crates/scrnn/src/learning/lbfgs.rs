@@ -268,10 +268,19 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::batch::Item;
+    use crate::dataset::{Dataset, Sequence};
     use crate::engine::Engine;
     use crate::initialization::initialize;
+    use crate::objective::{Backend, Request, Run};
     use crate::topology::{Group, Prediction};
+
+    /// All sequences in one batch.
+    fn batches(topology: &Topology, samples: &[Vec<f64>]) -> Batches {
+        let sequences: Vec<_> = samples.iter().map(|own| Sequence::new("", 1, own.clone()).unwrap()).collect();
+        let data = Dataset::new(vec!["y".into()], sequences).unwrap();
+        let objective = Engine::serial().objective(&Request::new(topology, &data)).unwrap();
+        Batches::new(objective, topology, Run::through_all(&data, 1), samples.len())
+    }
 
     /// A network with learned and unlearned initial states on two sequences, its batches and a rule.
     fn problem(variance: f64) -> (LbfgsRule, Batches, Parameters, InitialStates) {
@@ -279,13 +288,12 @@ mod tests {
         let topology = Topology::new(1, 1, groups, Prediction::MeanAndVariance { floor: 0.0 }).unwrap();
         let samples: Vec<Vec<f64>> =
             (0..2).map(|s| (0..12 + s).map(|t| 0.6 * (0.5 * t as f64 + s as f64).sin()).collect()).collect();
-        let items: Vec<Item<'_>> = samples.iter().map(|own| Item { samples: own, steps: own.len() - 1 }).collect();
         let (network, mut states) = initialize(&topology, 2, 3);
         let far = variance.sqrt().min(1.0);
         for (index, u0) in states.values_mut().iter_mut().enumerate().filter(|(index, _)| index % 5 > 2) {
             *u0 += far * (0.3 + 0.2 * index as f64);
         }
-        let batches = Batches::new(&topology, &items, 2, false, &Engine::serial());
+        let batches = batches(&topology, &samples);
         let rule = LbfgsRule::new(&Lbfgs { share: 1.0, memory: 4 }, &topology, 2, 23.0, variance);
         (rule, batches, network.parameters, states)
     }
@@ -381,14 +389,12 @@ mod tests {
     fn where_nothing_can_be_gained_nothing_moves() {
         let groups = vec![Group::full("context", 3, 2.0)];
         let topology = Topology::new(1, 1, groups, Prediction::Mean).unwrap();
-        let samples = vec![0.0; 9];
-        let batches = || Batches::new(&topology, &[Item { samples: &samples, steps: 8 }], 1, false, &Engine::serial());
         let (mut network, mut states) = initialize(&topology, 1, 3);
         // All weights and biases 0 predict the zeros exactly.
         network.parameters.as_mut_slice().fill(0.0);
         let mean = states.mean().to_vec();
         states.values_mut().copy_from_slice(&mean);
-        let (before, mut batches) = ((network.clone(), states.clone()), batches());
+        let (before, mut batches) = ((network.clone(), states.clone()), batches(&topology, &[vec![0.0; 9]]));
         let mut rule = LbfgsRule::new(&Lbfgs::default(), &topology, 1, 8.0, 1.0);
         batches.evaluate(&network.parameters, &states);
         assert!(!rule.ascend(&mut batches, &mut network.parameters, &mut states));

@@ -82,7 +82,9 @@ pub enum PriorStep {
 }
 
 /// The adaptive rate (D.1): one factor on both rates. An update that lets the squared error grow by more than
-/// `max_error_ratio` is withdrawn and tried again at a lower rate.
+/// `max_error_ratio` is withdrawn and tried again at a lower rate. Every try is judged: where none holds, nothing moves in this
+/// epoch, the report says so ([`EpochReport::withdrawn`](super::EpochReport::withdrawn)), and the next epoch begins at the rate that
+/// is left.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AdaptiveRate {
     /// r_th.
@@ -91,7 +93,7 @@ pub struct AdaptiveRate {
     pub decrease: f64,
     /// alpha_inc.
     pub increase: f64,
-    /// Tries for each epoch.
+    /// Tries for each epoch, at least 1.
     pub max_tries: u32,
 }
 

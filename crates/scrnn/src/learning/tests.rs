@@ -89,6 +89,33 @@ fn a_learner_without_variance_lowers_the_squared_error() {
 }
 
 #[test]
+fn a_single_try_is_judged_and_withdrawn() {
+    for max_tries in [1, 2] {
+        let adaptive = AdaptiveRate { max_error_ratio: 1.02, max_tries, ..AdaptiveRate::default() };
+        let plan = momentum(300, Momentum { rate: 1.0, adaptive: Some(adaptive), ..Momentum::default() });
+        let mut learner = learner(plan, 1);
+        let (mut reports, mut networks) = (Vec::new(), Vec::new());
+        let outcome = learner.run(&mut |report: &EpochReport, learner: &Learner| {
+            reports.push(report.clone());
+            networks.push(bits(learner));
+            Control::Continue
+        });
+        assert_eq!(outcome, Outcome::Finished);
+        let (mut withdrawn, mut lowered) = (0, 0);
+        for (epoch, pair) in reports.windows(2).enumerate() {
+            let ratio = pair[1].mse / pair[0].mse;
+            assert!(ratio <= 1.02 + 1e-12, "the error grew by {ratio} at epoch {}", epoch + 1);
+            let tries = ((pair[1].rate_shared / pair[0].rate_shared).ln() / 0.7_f64.ln()).round();
+            assert_eq!(pair[1].withdrawn, tries == f64::from(max_tries), "epoch {}", epoch + 1);
+            assert_eq!(pair[1].withdrawn, networks[epoch] == networks[epoch + 1]);
+            withdrawn += usize::from(pair[1].withdrawn);
+            lowered += usize::from(tries > 0.0);
+        }
+        assert!(withdrawn > 2 && withdrawn < 100 && lowered >= withdrawn, "{withdrawn} withdrawn, {lowered} lowered");
+    }
+}
+
+#[test]
 fn stopping_and_restoring_goes_on_bit_for_bit() {
     let adaptive = Momentum { adaptive: Some(AdaptiveRate::default()), ..Momentum::default() };
     let narrow = Plan { initial_state_variance: 1e-5, ..momentum(60, Momentum::default()) };

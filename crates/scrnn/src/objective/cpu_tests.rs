@@ -5,8 +5,7 @@ use crate::initial_states::InitialStates;
 use crate::initialization::initialize;
 use crate::likelihood;
 use crate::network::Network;
-use crate::parameters::Block as Parameter;
-use crate::topology::{Group, Prediction};
+use crate::topology::{Group, Prediction, Topology};
 
 const FLOORLESS: Prediction = Prediction::MeanAndVariance { floor: 0.0 };
 
@@ -64,6 +63,14 @@ impl Case {
         Point { network, states }
     }
 
+    /// The objective's data, which are the samples, and a run through each sequence.
+    fn data(&self) -> (Dataset, Vec<Run>) {
+        let sequences = self.samples().into_iter().map(|x| Sequence::new("", self.channels, x).unwrap());
+        let data = Dataset::new(Dataset::numbered_channels(self.channels), sequences.collect()).unwrap();
+        let runs = Run::through_all(&data, self.delay);
+        (data, runs)
+    }
+
     fn samples(&self) -> Vec<Vec<f64>> {
         let wave = |s: usize, k: usize| 0.7 * ((k as f64) * (0.3 + 0.1 * s as f64) + s as f64 + 0.5).sin();
         let of = |(s, &steps): (usize, &usize)| (0..(steps + self.delay) * self.channels).map(|k| wave(s, k)).collect();
@@ -89,13 +96,23 @@ fn difference(mut f: impl FnMut(f64) -> f64, h: f64) -> f64 {
     (8.0 * (f(h) - f(-h)) - (f(2.0 * h) - f(-2.0 * h))) / (12.0 * h)
 }
 
+/// What an objective finds that was in use before.
+fn evaluation(case: &Case, engine: &Engine) -> Evaluation {
+    let (point, (data, runs)) = (case.point(), case.data());
+    let request = Request { recompute: case.recompute, ..Request::new(&point.network.topology, &data) };
+    let mut objective = engine.objective(&request).unwrap();
+    let mut evaluation = Evaluation::new(&point.network.topology);
+    objective.set_parameters(&point.network.parameters);
+    for _ in 0..2 {
+        objective.evaluate(&runs, point.states.values(), Want::Everything, &mut evaluation);
+    }
+    evaluation
+}
+
 fn check(case: &Case) {
     let (point, samples) = (case.point(), case.samples());
     let topology = &point.network.topology;
-    let items: Vec<_> = samples.iter().zip(case.lengths).map(|(x, &steps)| Item { samples: x, steps }).collect();
-    let mut objective = Objective::new(topology, &items, case.recompute, &Engine::serial());
-    objective.set_parameters(&point.network.parameters);
-    objective.evaluate(point.states.values(), Want::Everything);
+    let objective = evaluation(case, &Engine::serial());
 
     for (s, (x, &steps)) in samples.iter().zip(case.lengths).enumerate() {
         let (plain, squared) = likelihood::plain(&point.network, point.states.sequence(s), x, steps);
@@ -245,16 +262,9 @@ fn more_channels_than_units() {
 }
 
 fn evaluate(case: &Case, engine: &Engine) -> (Vec<u64>, Vec<u64>) {
-    let (point, samples) = (case.point(), case.samples());
-    let items: Vec<_> = samples.iter().zip(case.lengths).map(|(x, &steps)| Item { samples: x, steps }).collect();
-    let mut objective = Objective::new(&point.network.topology, &items, case.recompute, engine);
-    objective.set_parameters(&point.network.parameters);
-    for _ in 0..2 {
-        objective.evaluate(point.states.values(), Want::Everything);
-    }
+    let Evaluation { gradients, initial, ln_likelihood, squared_error, .. } = evaluation(case, engine);
     let bits = |values: &[f64]| values.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
-    let states = [objective.initial.as_slice(), &objective.ln_likelihood, &objective.squared_error].concat();
-    (bits(objective.gradients.as_slice()), bits(&states))
+    (bits(gradients.as_slice()), bits(&[initial, ln_likelihood, squared_error].concat()))
 }
 
 const LONG: Case = Case {
@@ -281,11 +291,10 @@ fn recomputation_of_spans_gives_the_same_bits() {
 #[test]
 fn recomputation_keeps_a_small_part_of_the_states() {
     let topology = LONG.point().network.topology;
-    let samples = vec![0.0; 2 * 20_001];
-    let items = [Item { samples: &samples, steps: 20_000 }];
     let packed = Packed::new(&topology, crate::engine::InstructionSet::best());
-    let block = &batch::blocks(&topology, &items)[0];
-    let cut = Cut::new(&packed, block, true);
+    let mut block = Block::default();
+    block.fill(&[Run::new(0, 20_000)], &[0]);
+    let cut = Cut::new(&packed, &block, true);
     assert!(cut.spans() > 10 && cut.span * 10 < cut.products, "{cut:?}");
 }
 
@@ -296,4 +305,56 @@ fn every_instruction_set_gives_the_same_bits() {
     for set in crate::engine::InstructionSet::available() {
         assert!(evaluate(&case, &Engine::new(1, set).unwrap()) == portable, "{set}");
     }
+}
+
+#[test]
+fn evaluations_of_other_runs_in_between_change_no_bit() {
+    let (point, (data, runs)) = (LONG.point(), LONG.data());
+    let topology = &point.network.topology;
+    let (n_c, values) = (topology.context_units(), point.states.values());
+    let mut objective = Engine::serial().objective(&Request::new(topology, &data)).unwrap();
+    objective.set_parameters(&point.network.parameters);
+    let mut evaluate = |part: std::ops::Range<usize>, want| {
+        let mut evaluation = Evaluation::new(topology);
+        objective.evaluate(&runs[part.clone()], &values[part.start * n_c..part.end * n_c], want, &mut evaluation);
+        evaluation
+    };
+    let all = evaluate(0..13, Want::Everything);
+    let part = evaluate(3..8, Want::Everything);
+    assert_eq!(evaluate(0..0, Want::Everything).gradients, Parameters::zeros(topology));
+    assert_eq!(evaluate(3..8, Want::Score).ln_likelihood, part.ln_likelihood);
+    assert_eq!(evaluate(0..13, Want::Everything), all);
+    assert_eq!(evaluate(3..8, Want::Everything), part);
+    assert_eq!(
+        (&part.ln_likelihood[..], &part.initial[..]),
+        (&all.ln_likelihood[3..8], &all.initial[3 * n_c..8 * n_c])
+    );
+}
+
+#[test]
+fn what_cannot_be_evaluated_is_nan() {
+    let (point, (data, runs)) = (SMALL.point(), SMALL.data());
+    let topology = &point.network.topology;
+    let mut objective = Engine::serial().objective(&Request::new(topology, &data)).unwrap();
+    let other = Parameters::zeros(&Topology::s_ctrnn(2, 4, 2.0).unwrap());
+    let mut found = |parameters: &Parameters, runs: &[Run], initial: &[f64]| {
+        let mut evaluation = Evaluation::new(topology);
+        objective.set_parameters(parameters);
+        objective.evaluate(runs, initial, Want::Everything, &mut evaluation);
+        let Evaluation { gradients, initial, ln_likelihood, squared_error, .. } = evaluation;
+        [gradients.as_slice(), &initial, &ln_likelihood, &squared_error].concat()
+    };
+    let (parameters, initial) = (&point.network.parameters, point.states.values());
+    for nan in [
+        found(&other, &runs, initial),
+        found(parameters, &runs, &initial[1..]),
+        found(parameters, &[Run::new(3, 1)], &initial[..5]),
+        found(parameters, &[Run::new(0, 10)], &initial[..5]),
+        found(parameters, &[Run::new(0, 0)], &initial[..5]),
+    ] {
+        assert!(nan.len() > 40 && nan.iter().all(|value| value.is_nan()));
+    }
+    assert!(found(parameters, &runs, initial).iter().all(|value| value.is_finite()));
+    let narrow = Topology::s_ctrnn(1, 5, 2.0).unwrap();
+    assert!(Engine::serial().objective(&Request::new(&narrow, &data)).is_err());
 }
