@@ -126,5 +126,6 @@ mod backward;
 mod batch;
 mod objective;
 mod packed;
+mod quasi_newton;
 mod stepper;
 mod trajectory;
