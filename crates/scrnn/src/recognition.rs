@@ -11,7 +11,6 @@
 
 use std::fmt;
 
-use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
@@ -22,6 +21,7 @@ use crate::error::{Error, Result};
 use crate::initial_states::{InitialStates, add_ln_prior};
 use crate::network::Network;
 use crate::objective::{Objective, Want};
+use crate::streams::{Purpose, stream};
 
 mod ascent;
 mod polish;
@@ -182,8 +182,7 @@ pub fn recognize(
         ranking.truncate(options.ranked);
         ranking.shrink_to_fit();
         results.push(Recognition { trials: Vec::with_capacity(starts.len()), ranking, polish: Polish::default() });
-        let mut random = ChaCha8Rng::seed_from_u64(options.seed);
-        random.set_stream(s as u64);
+        let mut random = stream(options.seed, Purpose::RecognitionStarts, s as u64);
         for start in starts {
             let state = initial_state(network, learned, start, options.random_spread, &mut random);
             waiting.push(Origin { sequence: s, start, state });

@@ -7,8 +7,6 @@
 //! its predecessors left, and what an epoch reports is the sum of that: values of parameters on their way. Only before the
 //! first update and after the last are all sequences evaluated at the same parameters.
 
-use rand::SeedableRng;
-use rand::rngs::ChaCha8Rng;
 use rand::seq::SliceRandom;
 
 use super::adam::{self, AdamRule};
@@ -20,6 +18,7 @@ use crate::error::Result;
 use crate::initial_states::InitialStates;
 use crate::objective::{Objective, Want};
 use crate::parameters::{Gradients, Parameters};
+use crate::streams::{Purpose, stream};
 use crate::topology::Topology;
 
 /// Some of the sequences.
@@ -59,7 +58,7 @@ impl Batches {
         let count = items.len().div_ceil(size.max(1)).max(1);
         let mut dealt: Vec<usize> = (0..items.len()).collect();
         if count > 1 {
-            dealt.shuffle(&mut ChaCha8Rng::seed_from_u64(0));
+            dealt.shuffle(&mut stream(0, Purpose::BatchMembers, 0));
         }
         let batch = |index: usize| {
             let mut sequences: Vec<usize> = dealt.iter().copied().skip(index).step_by(count).collect();
@@ -128,7 +127,7 @@ impl Batches {
         let count = self.batches.len();
         if count > 1 {
             self.order.sort_unstable();
-            self.order.shuffle(&mut ChaCha8Rng::seed_from_u64(epoch));
+            self.order.shuffle(&mut stream(0, Purpose::BatchOrder, epoch));
         }
         for nth in 0..count {
             let index = self.order[nth];
