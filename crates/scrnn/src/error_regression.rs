@@ -9,9 +9,17 @@
 //! without noise, and that state is moved uphill; then the window's past is overwritten with what follows from it, and
 //! so is the prediction of the next sample. Only the groups whose initial state is learned are moved.
 //!
-//! Channels can be left out of ln L_reg, or count in part. The gradient is exact: it also runs through the means that the window feeds back to itself. Inputs of the window's
-//! first xi steps are the means predicted before it, which stay as they were, or samples where there was no prediction
-//! yet.
+//! Channels can be left out of ln L_reg, or count in part. The gradient is exact: it also runs through the means that the window
+//! feeds back to itself. Inputs of the window's first xi steps are the means predicted before it, which stay as they were, or
+//! samples where there was no prediction yet.
+//!
+//! # At the thesis' rate the ascent is chaotic
+//!
+//! alpha_reg is a fixed step, however steep the likelihood is. On trained networks with many context units the iterations do not
+//! converge at the thesis' rate but jump about, and small differences grow: two regressions whose states differ by 1e-15 differ by
+//! 0.26 ten samples later. The same samples still give the same bits, on any instruction set. But whatever rounds otherwise (samples
+//! that went through another unit, a network that was trained by another version) leads to other states, and so to other reaction
+//! times. Compare averages over many trials, never one trial with another.
 
 use aligned_vec::AVec;
 use pulp::{Simd, WithSimd};

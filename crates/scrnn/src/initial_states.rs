@@ -66,17 +66,8 @@ impl InitialStates {
     /// ln L_init of (2.16) in nats, constant included.
     #[must_use]
     pub fn ln_prior(&self, topology: &Topology, variance: f64) -> f64 {
-        let constant = -0.5 * (2.0 * std::f64::consts::PI * variance).ln();
-        let mut sum = 0.0;
-        for u0 in self.values.chunks_exact(self.units) {
-            let learned = topology.per_unit(|group| group.learns_initial_state);
-            for ((&u0, &mean), learned) in u0.iter().zip(&self.mean).zip(learned) {
-                if learned {
-                    sum += constant - (u0 - mean).powi(2) / (2.0 * variance);
-                }
-            }
-        }
-        sum
+        let states = self.values.chunks_exact(self.units);
+        states.fold(0.0, |sum, u0| add_ln_prior(sum, topology, variance, u0, &self.mean))
     }
 
     /// Adds the prior's part of the gradient to `states`, and writes the mean's gradient into `mean`:
@@ -98,4 +89,16 @@ impl InitialStates {
             }
         }
     }
+}
+
+/// Adds ln L_init of one sequence (2.16) to `sum`, unit after unit.
+pub(crate) fn add_ln_prior(mut sum: f64, topology: &Topology, variance: f64, u0: &[f64], mean: &[f64]) -> f64 {
+    let constant = -0.5 * (2.0 * std::f64::consts::PI * variance).ln();
+    let learned = topology.per_unit(|group| group.learns_initial_state);
+    for ((&u0, &mean), learned) in u0.iter().zip(mean).zip(learned) {
+        if learned {
+            sum += constant - (u0 - mean).powi(2) / (2.0 * variance);
+        }
+    }
+    sum
 }

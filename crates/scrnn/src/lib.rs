@@ -90,6 +90,7 @@
 //! | [`learning`] | momentum ascent, its adaptive rate, Adam; the loop with its observer | 2.6.2, D.1 |
 //! | [`generation`], [`recognition`] | open, closed and mixed loop; the search for u_0 | 2.8, 2.9 |
 //! | [`error_regression`] | recognition while samples arrive, over a sliding window | 2.10.2 |
+//! | [`streams`] | where random numbers come from: a stream for each seed, purpose and index | |
 //! | [`evaluation`], [`analysis`] | errors and bounds; components, clusters, calibration, simple models | 3.2.4-3.2.6 |
 //! | [`checkpoint`] | a trained network as bytes | |
 //! | [`error`] | what can be wrong with a request | |
@@ -122,10 +123,12 @@ pub mod objective;
 pub mod parameters;
 pub mod recognition;
 pub mod scaling;
+pub mod streams;
 pub mod topology;
 
 mod backward;
 mod batch;
 mod packed;
+mod quasi_newton;
 mod stepper;
 mod trajectory;

@@ -11,14 +11,14 @@
 //! [`make`] makes any of them by its [`TaskName`].
 //!
 //! The thesis' t runs from 1 to T: the sample at index k, counted from 0 as everywhere in this crate, is t = k + 1.
-//! Sequences are named "1", "2", ... as in the thesis. Sequence s draws from stream s of a ChaCha8 generator, so it
-//! does not depend on how many sequences are asked for, and a longer sequence begins like a shorter one.
+//! Sequences are named "1", "2", ... as in the thesis. Sequence s draws from a stream of its own
+//! ([`scrnn::streams`]), so it does not depend on how many sequences are asked for, and a longer one begins like a shorter one.
 
-use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::error::{Error, Result};
+use scrnn::streams::{Purpose, stream};
 
 pub mod interact;
 pub mod limit_cycle;
@@ -61,9 +61,7 @@ fn check(sequences: usize, steps: usize) -> Result<()> {
 
 /// The generator of sequence `s`, counted from 0.
 fn generator(seed: u64, s: usize) -> ChaCha8Rng {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    rng.set_stream(s as u64);
-    rng
+    stream(seed, Purpose::TaskData, s as u64)
 }
 
 /// A sample of N(0, 1).
@@ -109,6 +107,10 @@ fn noisy<const N: usize>(
 
 #[cfg(test)]
 mod tests {
+    use scrnn::evaluation::correlation;
+    use scrnn::initialization::initialize;
+    use scrnn::topology::Topology;
+
     use super::*;
 
     /// Root mean square of (sample - mean) / true standard deviation, over the samples of sequence `s` that have noise.
@@ -134,5 +136,25 @@ mod tests {
         assert_eq!(draw(1, 0), draw(1, 0));
         assert_ne!(draw(1, 0), draw(1, 1));
         assert_ne!(draw(1, 0), draw(2, 0));
+    }
+
+    #[test]
+    fn initial_weights_and_the_noise_of_the_first_sequence_have_nothing_in_common() {
+        let topology = Topology::s_ctrnn(2, 8, 2.0).unwrap();
+        let (mut weights, mut noise) = (Vec::new(), Vec::new());
+        for seed in 0..200 {
+            // The first numbers that are drawn, before a draw that takes two of them sets the two apart.
+            let (network, _) = initialize(&topology, 1, seed);
+            weights.extend_from_slice(&network.parameters.as_slice()[..16]);
+            let task = lissajous::generate(&lissajous::Options { sequences: 1, steps: 8 }, seed).unwrap();
+            let [data, means] = [&task.data, &task.means].map(|set| set.sequences()[0].values());
+            noise.extend(data.iter().zip(means).map(|(sample, mean)| sample - mean));
+        }
+        let n = weights.len() as f64;
+        let alike = weights.iter().zip(&noise).filter(|(a, b)| a.is_sign_positive() == b.is_sign_positive()).count();
+        // Five deviations of a coin.
+        assert!((alike as f64 / n - 0.5).abs() < 2.5 / n.sqrt(), "{alike} of {n} signs are the same");
+        let correlation = correlation(&weights, &noise).unwrap();
+        assert!(correlation.abs() < 5.0 / n.sqrt(), "{correlation}");
     }
 }

@@ -210,10 +210,12 @@ mod tests {
     fn sequences_lie_on_the_cycle_from_their_first_sample_at_different_phases() {
         let LimitCycle { task, z } = generate(&Options::default(), 3).unwrap();
         assert_eq!((task.data.sequences().len(), task.data.total_samples()), (10, 10_000));
-        let mut starts: Vec<f64> = task.data.sequences().iter().map(|sequence| sequence.sample(0)[0]).collect();
+        // Two of five phases have y below -0.3, and two above 0.3: among forty there are some of both, whatever the seed.
+        let many = generate(&Options { sequences: 40, steps: 1 }, 3).unwrap().task.data;
+        let mut starts: Vec<f64> = many.sequences().iter().map(|sequence| sequence.sample(0)[0]).collect();
         starts.sort_by(f64::total_cmp);
-        assert!(starts.windows(2).all(|pair| pair[1] - pair[0] > 1e-3), "{starts:?}");
-        assert!(starts[0] < -0.3 && starts[9] > 0.3, "{starts:?}");
+        assert!(starts.windows(2).all(|pair| pair[1] > pair[0]), "{starts:?}");
+        assert!(starts[4] < -0.3 && starts[35] > 0.3, "{starts:?}");
         for (y, z) in task.data.sequences().iter().zip(z.sequences()) {
             for (y, z) in y.values().iter().zip(z.values()) {
                 let radius = y.hypot(*z);
@@ -226,8 +228,8 @@ mod tests {
     fn seed_42_gives_these_values() {
         let LimitCycle { task, z } = generate(&Options { sequences: 2, steps: 1000 }, 42).unwrap();
         // Sums and products alone: the bits are the same on every platform.
-        assert_eq!(task.data.sequences()[1].sample(0), [-0.1175739516491179]);
-        assert_eq!(task.data.sequences()[1].sample(999), [0.6637778631965175]);
-        assert_eq!(z.sequences()[1].sample(999), [0.26613646353429116]);
+        assert_eq!(task.data.sequences()[1].sample(0), [0.10949589893967172]);
+        assert_eq!(task.data.sequences()[1].sample(999), [-0.5120029033575435]);
+        assert_eq!(z.sequences()[1].sample(999), [-0.3575550432582247]);
     }
 }

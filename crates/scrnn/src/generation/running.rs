@@ -1,15 +1,15 @@
 //! One network beside a world that moves on: it takes in a sample and predicts, step by step.
 
 use pulp::{Simd, WithSimd};
-use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 
-use super::{DOMAIN, Feedback, check, draw, input};
+use super::{Feedback, check, draw, input};
 use crate::engine::{InstructionSet, Run};
 use crate::error::{Error, Result};
 use crate::network::Network;
 use crate::packed::Packed;
 use crate::stepper::Stepper;
+use crate::streams::{Purpose, stream};
 
 /// A network that generates while its samples are still to come. Stepped through recorded samples it gives the bits of
 /// [`generate`](super::generate) with one start.
@@ -61,7 +61,7 @@ impl Running {
             stepper,
             set,
             feedback,
-            random: ChaCha8Rng::seed_from_u64(seed ^ DOMAIN),
+            random: stream(seed, Purpose::Generation, 0),
             delay,
             floor: topology.variance_floor(),
             has_variance,

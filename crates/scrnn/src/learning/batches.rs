@@ -9,8 +9,6 @@
 
 use std::ops::Range;
 
-use rand::SeedableRng;
-use rand::rngs::ChaCha8Rng;
 use rand::seq::SliceRandom;
 
 use super::adam::{self, AdamRule};
@@ -20,6 +18,7 @@ use crate::error::Result;
 use crate::initial_states::InitialStates;
 use crate::objective::{Evaluation, Objective, Run, Want};
 use crate::parameters::{Gradients, Parameters};
+use crate::streams::{Purpose, stream};
 use crate::topology::Topology;
 
 /// All sequences. Batches are parts of one list: there is one objective, and room for the largest of them.
@@ -92,7 +91,7 @@ impl Batches {
         self.ends.push(sequences);
         if count > 1 {
             let mut shuffled: Vec<usize> = (0..sequences).collect();
-            shuffled.shuffle(&mut ChaCha8Rng::seed_from_u64(0));
+            shuffled.shuffle(&mut stream(0, Purpose::BatchMembers, 0));
             (self.dealt, self.ends) = (Vec::with_capacity(sequences), Vec::with_capacity(count));
             for index in 0..count {
                 let start = self.dealt.len();
@@ -169,7 +168,7 @@ impl Batches {
         let count = self.count();
         if count > 1 {
             self.order.sort_unstable();
-            self.order.shuffle(&mut ChaCha8Rng::seed_from_u64(epoch));
+            self.order.shuffle(&mut stream(0, Purpose::BatchOrder, epoch));
         }
         for nth in 0..count {
             let index = self.order[nth];
