@@ -4,27 +4,20 @@
 //! Everything public is in nalgebra's types, metres, radians, seconds and newtons. Nothing here opens a file, prints, or
 //! reads a clock, and the same calls in the same order give the same bits.
 
-pub mod agent;
-pub mod camera;
-pub mod channels;
 pub mod error;
-pub mod film;
-pub mod follower;
-pub mod gaze;
-pub mod interaction;
-pub mod joints;
-pub mod kinematics;
-pub mod nao;
+pub mod interact;
 pub mod parallel;
-pub mod reaching;
-pub mod reaching_recording;
+pub mod reach;
 pub mod recording;
 pub mod robot;
-pub mod scene;
-pub mod touching;
-pub mod tutor;
 pub mod world;
 
-mod articulation;
-#[cfg(test)]
-mod description_tests;
+// The paths before the modules had folders, for callers that still use them.
+#[doc(hidden)]
+pub use interact::{film, follower, interaction};
+#[doc(hidden)]
+pub use reach::{agent, channels, recording as reaching_recording, stage as reaching, touching, tutor};
+#[doc(hidden)]
+pub use robot::{camera, gaze, joints, kinematics, nao};
+#[doc(hidden)]
+pub use world::scene;

@@ -1,37 +1,8 @@
 //! What there is to see at one moment: shapes with their places. Recordings and pictures are made from it.
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::Isometry3;
 
-/// A simple body, in a frame of its own.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Shape {
-    /// Around the origin.
-    Sphere {
-        /// In metres.
-        radius: f64,
-    },
-    /// A cylinder with round ends.
-    Capsule {
-        /// Centre of one end, in metres.
-        a: Point3<f64>,
-        /// Centre of the other end, in metres.
-        b: Point3<f64>,
-        /// In metres.
-        radius: f64,
-    },
-    /// Around the origin, along z.
-    Cylinder {
-        /// Half of its length, in metres.
-        half_length: f64,
-        /// In metres.
-        radius: f64,
-    },
-    /// A box around the origin.
-    Cuboid {
-        /// Half of its size along x, y and z, in metres.
-        half_extents: [f64; 3],
-    },
-}
+pub use crate::robot::Shape;
 
 /// What a body is, for its colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

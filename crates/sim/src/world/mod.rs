@@ -13,11 +13,15 @@ use rapier3d_f64::prelude::{
     RigidBodyHandle, SharedShape, SolverFlags,
 };
 
-pub use crate::articulation::Servo;
-use crate::articulation::{Articulation, from_pose, to_pose, to_shape, to_vector};
 use crate::error::{Error, Result};
-use crate::robot::Robot;
-use crate::scene::{Body, Frame, Part, Scene, Shape};
+use crate::robot::{Robot, Shape};
+pub use articulation::Servo;
+use articulation::{Articulation, from_pose, to_pose, to_shape, to_vector};
+use scene::{Body, Frame, Part, Scene};
+
+pub mod scene;
+
+mod articulation;
 
 /// How the world runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -494,5 +498,4 @@ impl World {
 }
 
 #[cfg(test)]
-#[path = "world_tests.rs"]
 mod tests;

@@ -1,7 +1,7 @@
 //! Demonstrations: precise where it matters, free where it does not.
 
 use super::*;
-use crate::touching::spread;
+use crate::reach::touching::spread;
 
 fn few(placement: f64, threads: usize) -> Vec<Demonstration> {
     let tutoring = Tutoring { sequences: 3, samples: 60, placement, ..Tutoring::default() };

@@ -17,10 +17,10 @@ use scrnn::generation::{ChannelFeedback, Feedback, Running};
 use scrnn::network::Network;
 use scrnn::scaling::Scaling;
 
-use crate::channels::{ARM, REACHING, VISION};
 use crate::error::{Error, Result};
-use crate::reaching::{Stage, retracted_arm, samples_to_steps};
-use crate::touching::{Cycle, Watch};
+use crate::reach::channels::{ARM, REACHING, VISION};
+use crate::reach::stage::{Stage, retracted_arm, samples_to_steps};
+use crate::reach::touching::{Cycle, Watch};
 use crate::world::WorldOptions;
 
 /// What is expected of the next sample, and where the arm is to go, by channel in rad.
@@ -272,7 +272,7 @@ pub fn perform<E: From<Error>>(
     observer: &mut dyn FnMut(&Glimpse<'_>) -> std::result::Result<(), E>,
 ) -> std::result::Result<Performed, E> {
     let Performance { y, samples, shift, frozen, world } = performance;
-    let robot = crate::nao::load_one_armed()?;
+    let robot = crate::robot::nao::load_one_armed()?;
     let steps = samples_to_steps(world)?;
     let mut arm = retracted_arm(&robot, *y)?;
     let mut stage = Stage::new(*world, *y, &arm, *frozen)?;

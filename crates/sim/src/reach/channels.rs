@@ -1,6 +1,6 @@
 //! What a network senses and predicts, by channel: which joints, in which order.
 
-use crate::joints::{HEAD, RIGHT_ARM};
+use crate::robot::joints::{HEAD, RIGHT_ARM};
 
 /// Channels of the reaching experiment (thesis 4.2.2): where the head looks stands for where the object is, and the arm's
 /// joints follow. They are named after the joints, and stand in the order of a one-armed NAO's q.

@@ -1,7 +1,7 @@
 //! Descriptions, sound and broken.
 
 use super::*;
-use crate::nao;
+use crate::robot::nao;
 
 const ARM: &str = r#"<robot name="arm">
   <link name="base"/>

@@ -5,8 +5,8 @@ use scrnn::initialization::initialize;
 use scrnn::topology::Topology;
 
 use super::*;
-use crate::nao;
-use crate::reaching::{CYCLE, POSITIONS, gaze_at, touching_arm};
+use crate::reach::stage::{CYCLE, POSITIONS, gaze_at, touching_arm};
+use crate::robot::nao;
 
 fn performance(samples: usize) -> Performance {
     Performance { y: POSITIONS[1], samples, shift: None, frozen: None, world: WorldOptions::default() }

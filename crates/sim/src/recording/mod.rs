@@ -42,7 +42,7 @@ use mcap::records::MessageHeader;
 use mcap::{Attachment, McapError};
 use serde::Serialize;
 
-use crate::scene::Scene;
+use crate::world::scene::Scene;
 use json::{Named, Time};
 
 mod error;

@@ -14,10 +14,10 @@ use scrnn::analysis::excursions::Side;
 use scrnn::dataset::Sequence;
 
 use crate::error::{Error, Result};
-use crate::gaze::{Gaze, LaggingGaze};
-use crate::joints::{HEAD, RIGHT_ARM};
-use crate::nao;
-use crate::scene::{Part, Scene, Shape};
+use crate::robot::gaze::{Gaze, LaggingGaze};
+use crate::robot::joints::{HEAD, RIGHT_ARM};
+use crate::robot::nao;
+use crate::world::scene::{Part, Scene, Shape};
 use crate::world::{BodyId, Placement, RobotId, World, WorldOptions};
 
 /// Channels of a sample: the object's centre in the image, head and right arm of the self-robot.

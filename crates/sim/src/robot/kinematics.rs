@@ -145,8 +145,8 @@ impl InverseKinematics {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::joints::{HEAD, LEFT_ARM, RIGHT_ARM};
-    use crate::nao;
+    use crate::robot::joints::{HEAD, LEFT_ARM, RIGHT_ARM};
+    use crate::robot::nao;
     use proptest::prelude::*;
 
     /// Some posture within the limits, from shares 0 to 1 of each joint's range.

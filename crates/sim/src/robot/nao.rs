@@ -1,12 +1,12 @@
 //! NAO, as the experiments use it.
 
-use crate::camera::Camera;
 use crate::error::Result;
-use crate::joints::{HEAD, LEFT_ARM, RIGHT_ARM};
 use crate::robot::Robot;
+use crate::robot::camera::Camera;
+use crate::robot::joints::{HEAD, LEFT_ARM, RIGHT_ARM};
 
 /// The description of NAO's upper body.
-pub const URDF: &str = include_str!("../../../assets/nao/nao.urdf");
+pub const URDF: &str = include_str!("../../assets/nao.urdf");
 
 /// Either of NAO's cameras, at the size that the experiments use.
 pub const CAMERA: Camera = Camera { horizontal_view: 1.0629, vertical_view: 0.8308, width: 320.0, height: 240.0 };

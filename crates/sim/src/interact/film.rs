@@ -2,9 +2,9 @@
 
 use std::io::Cursor;
 
-use crate::interaction::{CHANNELS, Interaction, PERIOD};
-use crate::joints::{HEAD, RIGHT_ARM};
-use crate::nao;
+use super::interaction::{CHANNELS, Interaction, PERIOD};
+use crate::robot::joints::{HEAD, RIGHT_ARM};
+use crate::robot::nao;
 use crate::recording::{Heading, Joint, Recorder, RecordingError, Robot};
 
 /// An MCAP recording in the making.

@@ -13,8 +13,8 @@ use scrnn::scaling::Scaling;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
-use crate::interaction::{ARM, CHANNELS, Collision, Interaction, arm_postures, branchings, primitive_len};
-use crate::nao;
+use crate::interact::interaction::{ARM, CHANNELS, Collision, Interaction, arm_postures, branchings, primitive_len};
+use crate::robot::nao;
 
 /// A trained network as an interaction needs it.
 #[derive(Debug, Clone, Copy)]

@@ -55,7 +55,7 @@ impl Camera {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nao;
+    use crate::robot::nao;
 
     #[test]
     fn the_axis_meets_the_centre_and_the_views_edges_the_image_s() {

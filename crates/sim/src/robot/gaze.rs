@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::error::{Error, Result};
-use crate::joints::{HEAD, pitch_limits};
+use crate::robot::joints::{HEAD, pitch_limits};
 use crate::robot::{Motion, Robot};
 
 /// Fixation with one of the head's cameras.
@@ -103,7 +103,7 @@ impl LaggingGaze {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nao;
+    use crate::robot::nao;
     use proptest::prelude::*;
 
     proptest! {

@@ -2,12 +2,12 @@
 
 use std::io::{Seek, Write};
 
-use crate::agent::Glimpse;
-use crate::channels::REACHING;
-use crate::nao;
-use crate::reaching::Stage;
+use crate::reach::agent::Glimpse;
+use crate::reach::channels::REACHING;
+use crate::reach::stage::Stage;
 use crate::recording::{Contact, Heading, Joint, Recorder, RecordingError, Robot};
-use crate::scene::Scene;
+use crate::robot::nao;
+use crate::world::scene::Scene;
 
 /// Seconds between two pictures of a performance.
 const PICTURES: f64 = 0.1;
@@ -142,11 +142,11 @@ mod tests {
     use std::io::Cursor;
 
     use super::*;
-    use crate::agent::{Performance, Replay, perform};
     use crate::error::Error;
-    use crate::nao::load_one_armed;
-    use crate::reaching::{POSITIONS, retracted_arm, touching_arm};
-    use crate::tutor::{Tutoring, demonstrate_and_look};
+    use crate::reach::agent::{Performance, Replay, perform};
+    use crate::reach::stage::{POSITIONS, retracted_arm, touching_arm};
+    use crate::reach::tutor::{Tutoring, demonstrate_and_look};
+    use crate::robot::nao::load_one_armed;
     use crate::world::WorldOptions;
 
     #[derive(Debug)]

@@ -4,7 +4,7 @@ use scrnn::initialization::initialize;
 use scrnn::topology::{Group, Prediction, Topology};
 
 use super::*;
-use crate::interaction::{InteractionOptions, parse_order, samples};
+use crate::interact::interaction::{InteractionOptions, parse_order, samples};
 
 fn moment(hand: f64) -> Moment {
     Moment {

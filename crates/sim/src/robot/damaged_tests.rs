@@ -1,8 +1,8 @@
 //! Robot descriptions that are damaged: read, or refused with a message, never a panic. Seeded, so that a failure comes again.
 
-use crate::nao::URDF;
 use crate::recording::{Heading, Recorder, Robot as Recorded};
 use crate::robot::Robot;
+use crate::robot::nao::URDF;
 
 /// Numbers that look random (splitmix64).
 struct Dice(u64);

@@ -10,14 +10,14 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use scrnn::dataset::{Dataset, Sequence};
 
-use crate::channels::REACHING;
 use crate::error::{Error, Result};
-use crate::joints::RIGHT_ARM;
-use crate::nao;
 use crate::parallel::in_parallel;
-use crate::reaching::{CYCLE, CYCLES, PERIOD, POSITIONS, RETRACTION, Stage, samples_to_steps, touching_arm};
+use crate::reach::channels::REACHING;
+use crate::reach::stage::{CYCLE, CYCLES, PERIOD, POSITIONS, RETRACTION, Stage, samples_to_steps, touching_arm};
+use crate::reach::touching::{Cycle, Watch};
 use crate::robot::Robot;
-use crate::touching::{Cycle, Watch};
+use crate::robot::joints::RIGHT_ARM;
+use crate::robot::nao;
 use crate::world::{Servo, WorldOptions};
 
 /// What the tutor does, and how well.

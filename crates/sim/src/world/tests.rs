@@ -3,8 +3,8 @@
 use nalgebra::{Point3, Translation3, UnitQuaternion};
 
 use super::*;
-use crate::joints::RIGHT_ARM;
-use crate::nao;
+use crate::robot::joints::RIGHT_ARM;
+use crate::robot::nao;
 
 const REST: [f64; 6] = [0.0, 0.0, 0.3, -0.6, 0.4, 1.0];
 

@@ -11,8 +11,8 @@ use rapier3d_f64::prelude::{
     RigidBodyBuilder, RigidBodyHandle, SharedShape,
 };
 
+use crate::robot::Shape;
 use crate::robot::{Inertia, Limits, Motion, Robot};
-use crate::scene::Shape;
 
 /// The spring that stands for a motor's control.
 #[derive(Debug, Clone, Copy, PartialEq)]

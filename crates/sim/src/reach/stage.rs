@@ -8,13 +8,13 @@ use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
 use crate::error::{Error, Result};
-use crate::gaze::Gaze;
-use crate::joints::RIGHT_ARM;
-use crate::kinematics::InverseKinematics;
-use crate::nao;
+use crate::reach::touching::Moment;
 use crate::robot::Robot;
-use crate::scene::{Part, Shape};
-use crate::touching::Moment;
+use crate::robot::gaze::Gaze;
+use crate::robot::joints::RIGHT_ARM;
+use crate::robot::kinematics::InverseKinematics;
+use crate::robot::nao;
+use crate::world::scene::{Part, Shape};
 use crate::world::{BodyId, Placement, RobotId, World, WorldOptions};
 
 /// Seconds between two samples, and between two joint targets.
