@@ -74,6 +74,8 @@ pub struct Joint {
     pub parent_from_joint: Isometry3<f64>,
     /// How it moves.
     pub motion: Motion,
+    /// The angle at which [`Robot::lock`] holds it, of a joint that the description calls movable.
+    pub locked_at: Option<f64>,
 }
 
 /// A tree of links.
@@ -82,9 +84,9 @@ pub struct Robot {
     /// As its description calls it.
     pub name: String,
     /// The first is the root.
-    pub links: Vec<Link>,
+    pub(crate) links: Vec<Link>,
     /// Sorted: a joint's parent link comes before its child link.
-    pub joints: Vec<Joint>,
+    pub(crate) joints: Vec<Joint>,
     /// For each angle of q, the index of its joint.
     pub(super) movable: Vec<usize>,
     /// Pairs of links that may overlap, beyond those that a joint connects; see [`Robot::ignore_contacts`].
@@ -92,6 +94,18 @@ pub struct Robot {
 }
 
 impl Robot {
+    /// All links. The first is the root.
+    #[must_use]
+    pub fn links(&self) -> &[Link] {
+        &self.links
+    }
+
+    /// All joints, sorted: a joint's parent link comes before its child link.
+    #[must_use]
+    pub fn joints(&self) -> &[Joint] {
+        &self.joints
+    }
+
     /// Number of angles.
     #[must_use]
     pub fn dof(&self) -> usize {
@@ -113,6 +127,17 @@ impl Robot {
     #[must_use]
     pub fn joint_names(&self) -> Vec<&str> {
         self.movable().map(|(joint, _)| joint.name.as_str()).collect()
+    }
+
+    /// Name and angle of every joint that the description calls movable: those of q, and those that are
+    /// [locked](Robot::lock). Whoever has only the description places all links with them.
+    #[must_use]
+    pub fn all_angles(&self, q: &[f64]) -> Vec<(&str, f64)> {
+        let angle = |joint: &Joint| match joint.motion {
+            Motion::Revolute { index, .. } => q.get(index).copied(),
+            Motion::Fixed => joint.locked_at,
+        };
+        self.joints.iter().filter_map(|joint| Some((joint.name.as_str(), angle(joint)?))).collect()
     }
 
     /// The place of a movable joint in q.
@@ -179,6 +204,7 @@ impl Robot {
             joint.parent_from_joint *= UnitQuaternion::from_axis_angle(&axis, angle);
         }
         joint.motion = Motion::Fixed;
+        joint.locked_at = Some(angle);
         for (place, &joint) in self.movable.iter().enumerate() {
             if let Motion::Revolute { index, .. } = &mut self.joints[joint].motion {
                 *index = place;

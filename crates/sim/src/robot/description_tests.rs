@@ -30,6 +30,42 @@ fn any_tree_of_turning_joints_is_read() {
 }
 
 #[test]
+fn a_cylinder_with_round_ends_is_one_capsule_and_other_shapes_stay() {
+    let with = |shapes: &str| {
+        let cylinder = r#"<collision><geometry><cylinder radius="0.1" length="0.5"/></geometry></collision>"#;
+        Robot::from_urdf(&ARM.replace(cylinder, shapes)).unwrap().links[1].shapes.clone()
+    };
+    let shape = |x: f64, y: f64, turn: &str, geometry: &str| {
+        format!(r#"<collision><origin xyz="{x} {y} 0" rpy="{turn}"/><geometry>{geometry}</geometry></collision>"#)
+    };
+    let (sphere, lying) = (r#"<sphere radius="0.1"/>"#, "0 1.5707963267948966 0");
+    let cylinder = shape(0.3, 0.2, lying, r#"<cylinder radius="0.1" length="0.4"/>"#);
+    let (left, right) = (shape(0.1, 0.2, "0 0 0", sphere), shape(0.5, 0.2, "0 0 0", sphere));
+    let other = shape(0.0, 0.0, "0 0 0", r#"<sphere radius="0.2"/>"#);
+
+    let joined = with(&[&left[..], &other, &cylinder, &right].concat());
+    assert_eq!(joined.len(), 2, "{joined:?}");
+    assert_eq!(joined[0].0, Shape::Sphere { radius: 0.2 });
+    let (Shape::Capsule { a, b, radius }, place) = &joined[1] else { panic!("{joined:?}") };
+    assert_eq!(*radius, 0.1);
+    assert!(
+        (place * a - Point3::new(0.1, 0.2, 0.0)).norm() < 1e-12
+            && (place * b - Point3::new(0.5, 0.2, 0.0)).norm() < 1e-12
+    );
+    // The extension says the same.
+    assert_eq!(with(&shape(0.3, 0.2, lying, r#"<capsule radius="0.1" length="0.4"/>"#))[0], joined[1]);
+
+    // One end alone, an end elsewhere, another radius: nothing is joined.
+    let elsewhere = shape(0.5, 0.21, "0 0 0", sphere);
+    let thin = shape(0.5, 0.2, "0 0 0", r#"<sphere radius="0.09"/>"#);
+    for shapes in [vec![&left, &cylinder], vec![&left, &cylinder, &elsewhere], vec![&left, &cylinder, &thin]] {
+        let kept = with(&shapes.iter().map(|shape| shape.as_str()).collect::<String>());
+        assert_eq!(kept.len(), shapes.len());
+        assert_eq!(kept[1].0, Shape::Cylinder { half_length: 0.2, radius: 0.1 });
+    }
+}
+
+#[test]
 fn what_is_wrong_is_named() {
     let cases = [
         ("<robot", "<obot", "cannot be read"),
@@ -81,6 +117,9 @@ fn a_locked_joint_holds_its_angle_and_links_keep_their_place() {
     for (a, b) in before.iter().zip(robot.forward(&q)) {
         assert!((a.translation.vector - b.translation.vector).norm() < 1e-12);
     }
+    let by_name = robot.all_angles(&q);
+    assert_eq!(by_name.len(), 10);
+    assert!(by_name.contains(&("RElbowYaw", 0.1 + 0.03 * 4.0)), "{by_name:?}");
     assert!(robot.joint("RElbowYaw").unwrap_err().to_string().contains("there is no movable joint `RElbowYaw`"));
     assert!(robot.lock("HeadYaw", 9.0).is_err());
 }
@@ -97,7 +136,7 @@ fn neighbours_may_overlap_and_others_may_not() {
 }
 
 #[test]
-fn a_link_that_is_not_there_is_told_with_those_that_are() {
-    let told = Robot::from_urdf(ARM).unwrap().link("lower").unwrap_err().to_string();
-    assert!(told.contains("lower") && told.contains("base, upper"), "{told}");
+fn a_link_that_is_not_there_is_refused_with_those_that_are() {
+    let message = Robot::from_urdf(ARM).unwrap().link("lower").unwrap_err().to_string();
+    assert!(message.contains("lower") && message.contains("base, upper"), "{message}");
 }

@@ -51,6 +51,7 @@ pub(crate) fn robot() -> Robot {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::robot::Shape;
 
     #[test]
     fn the_description_says_what_the_maker_publishes() {
@@ -64,6 +65,36 @@ mod tests {
         assert_eq!([bend.lower, bend.upper, bend.velocity, bend.effort], [0.034_906_6, 1.544_62, 7.194_07, 1.532]);
         let mirrored = robot.limits(robot.joint("LElbowRoll").unwrap());
         assert_eq!([mirrored.lower, mirrored.upper], [-1.544_62, -0.034_906_6]);
+    }
+
+    #[test]
+    fn the_description_has_standard_shapes_alone_and_round_parts_are_capsules() {
+        let description = urdf_rs::read_from_string(URDF).unwrap();
+        for link in &description.links {
+            let drawn = link.visual.iter().map(|visual| (&visual.geometry, &visual.origin));
+            for (geometry, _) in drawn.clone().chain(link.collision.iter().map(|one| (&one.geometry, &one.origin))) {
+                use urdf_rs::Geometry::{Box, Cylinder, Sphere};
+                assert!(
+                    matches!(geometry, Box { .. } | Cylinder { .. } | Sphere { .. }),
+                    "{}: {geometry:?}",
+                    link.name
+                );
+            }
+            let shown: Vec<String> = drawn.map(|one| format!("{one:?}")).collect();
+            let touched: Vec<String> =
+                link.collision.iter().map(|one| format!("{:?}", (&one.geometry, &one.origin))).collect();
+            assert_eq!(shown, touched, "{} looks other than it feels", link.name);
+        }
+        let robot = robot();
+        let capsules = |name: &str| {
+            let shapes = &robot.links[robot.link(name).unwrap()].shapes;
+            let round = shapes.iter().filter(|(shape, _)| matches!(shape, Shape::Capsule { .. })).count();
+            (shapes.len(), round)
+        };
+        for side in ["r", "l"] {
+            let part = |name: &str| capsules(&format!("{side}_{name}"));
+            assert_eq!([part("bicep"), part("forearm"), part("hand")], [(2, 1), (1, 1), (1, 1)]);
+        }
     }
 
     #[test]

@@ -11,6 +11,9 @@ use crate::error::{Error, Result};
 impl Robot {
     /// Reads a description.
     ///
+    /// Shapes for contacts are boxes, spheres and cylinders. A cylinder with a sphere of its radius at either end becomes one
+    /// [`Shape::Capsule`], and so does the `<capsule>` that some programs write, though the format does not know it.
+    ///
     /// # Errors
     /// [`Error::Unreadable`] when the text is no URDF, and [`Error::Link`] or [`Error::Joint`] with the name of what is
     /// wrong in it.
@@ -83,6 +86,7 @@ impl Robot {
                             parent_from_joint: finite_pose(&joint.origin)
                                 .map_err(|what| bad_joint(&joint.name, &what))?,
                             motion,
+                            locked_at: None,
                         });
                     }
                 }
@@ -164,7 +168,39 @@ fn read_link(link: &urdf_rs::Link, joint: Option<usize>) -> Result<Link> {
             Some(Inertia { mass, centre: place.translation.vector.into(), tensor })
         }
     };
-    Ok(Link { name: link.name.clone(), inertia, shapes: shapes.collect::<Result<_>>()?, joint })
+    let shapes = join_capsules(shapes.collect::<Result<_>>()?);
+    Ok(Link { name: link.name.clone(), inertia, shapes, joint })
+}
+
+/// How far a sphere may lie off the end of a cylinder and count as its round end, in metres.
+const AT_THE_END: f64 = 1e-6;
+
+/// A cylinder with a sphere of its own radius at either end has the surface of a capsule, and becomes one: a description's
+/// standard shapes have none, and one body for contacts is cheaper and smoother than three. All other shapes stay, in
+/// their order.
+fn join_capsules(shapes: Vec<(Shape, Isometry3<f64>)>) -> Vec<(Shape, Isometry3<f64>)> {
+    let mut shapes: Vec<Option<(Shape, Isometry3<f64>)>> = shapes.into_iter().map(Some).collect();
+    for cylinder in 0..shapes.len() {
+        let Some((Shape::Cylinder { half_length, radius }, place)) = shapes[cylinder] else { continue };
+        let ends = [-half_length, half_length].map(|z| Point3::new(0.0, 0.0, z));
+        let round = |end: &Point3<f64>| {
+            shapes.iter().position(|other| match other {
+                Some((Shape::Sphere { radius: own }, at)) => {
+                    let off = at.translation.vector - (place * end).coords;
+                    (own - radius).abs() <= AT_THE_END && off.norm() <= AT_THE_END
+                }
+                _ => false,
+            })
+        };
+        if let [Some(first), Some(second)] = ends.map(|end| round(&end))
+            && first != second
+        {
+            let [a, b] = ends;
+            shapes[cylinder] = Some((Shape::Capsule { a, b, radius }, place));
+            (shapes[first], shapes[second]) = (None, None);
+        }
+    }
+    shapes.into_iter().flatten().collect()
 }
 
 fn read_shape(geometry: &urdf_rs::Geometry) -> std::result::Result<Shape, String> {
