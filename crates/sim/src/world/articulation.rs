@@ -11,8 +11,9 @@ use rapier3d_f64::prelude::{
     RigidBodyBuilder, RigidBodyHandle, SharedShape,
 };
 
+use crate::error::{Error, Result};
 use crate::robot::Shape;
-use crate::robot::{Inertia, Limits, Motion, Robot};
+use crate::robot::{Inertia, Joint, Limits, Motion, Robot};
 
 /// The spring that stands for a motor's control.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,7 +51,16 @@ pub(crate) struct Articulation {
 
 impl Articulation {
     /// Sets a robot into the world, at rest.
-    pub fn insert(physics: &mut PhysicsWorld, robot: &Robot, world_from_root: &Isometry3<f64>, q: &[f64]) -> Self {
+    ///
+    /// # Errors
+    /// [`Error::Joint`] for a joint that rapier would refuse; nothing of the robot is in the world then.
+    pub fn insert(
+        physics: &mut PhysicsWorld,
+        robot: &Robot,
+        world_from_root: &Isometry3<f64>,
+        q: &[f64],
+    ) -> Result<Self> {
+        check_tree(robot)?;
         let rest = robot.forward(&vec![0.0; robot.dof()]);
         let place = |link: usize| (robot.group(link), rest[robot.group(link)].inv_mul(&rest[link]));
         let mut bodies = vec![None; robot.links.len()];
@@ -85,13 +95,13 @@ impl Articulation {
                 data = data.limits(JointAxis::AngX, [limits.lower, limits.upper]);
             }
             let child = links[joint.child].0;
-            if let Some(handle) = physics.multibody_joints.insert(parent, child, data.build(), true) {
-                motors.push(Motor { handle, limits, servo, goal, target: goal });
-            }
+            let handle = physics.multibody_joints.insert(parent, child, data.build(), true);
+            let handle = handle.ok_or_else(|| refused(robot, joint))?;
+            motors.push(Motor { handle, limits, servo, goal, target: goal });
         }
         let articulation = Self { links, motors };
         articulation.pose(physics, q);
-        articulation
+        Ok(articulation)
     }
 
     /// Brings the joints to their first angles.
@@ -144,6 +154,29 @@ impl Articulation {
                 })
         })
     }
+}
+
+/// A joint is refused by rapier if its child hangs on a joint already, or if it closes a ring. It is asked before anything
+/// is inserted: rapier cannot take back a tree of which it has refused a part.
+fn check_tree(robot: &Robot) -> Result<()> {
+    let mut tree: Vec<usize> = (0..robot.links.len()).collect();
+    let mut carried = vec![false; robot.links.len()];
+    for (joint, _) in robot.movable() {
+        let (parent, child) = (robot.group(joint.parent), robot.group(joint.child));
+        if carried[child] || tree[parent] == tree[child] {
+            return Err(refused(robot, joint));
+        }
+        carried[child] = true;
+        let (from, to) = (tree[child], tree[parent]);
+        tree.iter_mut().filter(|one| **one == from).for_each(|one| *one = to);
+    }
+    Ok(())
+}
+
+fn refused(robot: &Robot, joint: &Joint) -> Error {
+    let (child, parent) = (&robot.links[joint.child].name, &robot.links[joint.parent].name);
+    let what = format!("is refused by the physics; needed: a tree, in which `{child}` hangs on `{parent}` by it alone");
+    Error::Joint { joint: joint.name.clone(), what }
 }
 
 /// Mass properties of all links of a group, in the group's frame.

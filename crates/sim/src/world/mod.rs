@@ -4,24 +4,26 @@
 //! Two bodies touch when the distance of their shapes, which is negative in overlap, falls to nothing: the solver's own
 //! notion of contact begins a centimetre earlier.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Vector3};
-use rapier3d_f64::parry::query;
 use rapier3d_f64::prelude::{
-    ActiveHooks, ColliderBuilder, ColliderHandle, PairFilterContext, PhysicsHooks, PhysicsWorld, RigidBodyBuilder,
-    RigidBodyHandle, SharedShape, SolverFlags,
+    ActiveHooks, ColliderBuilder, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle, SharedShape,
 };
 
 use crate::error::{Error, Result};
 use crate::robot::{Robot, Shape};
-pub use articulation::Servo;
 use articulation::{Articulation, from_pose, to_pose, to_shape, to_vector};
+use contacts::Ignored;
 use scene::{Body, Frame, Part, Scene};
 
 pub mod scene;
 
 mod articulation;
+mod contacts;
+
+pub use articulation::Servo;
+pub use contacts::Contact;
 
 /// How the world runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,20 +65,20 @@ pub struct RobotId(usize);
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct BodyId(usize);
 
-/// Two bodies that touch.
+/// How a joint stands.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Contact {
-    /// The bodies, the one that came earlier into the world first.
-    pub bodies: [BodyId; 2],
-    /// How deep they overlap, in metres.
-    pub depth: f64,
-    /// With what force they push, in N.
-    pub force: f64,
+pub struct JointState<'a> {
+    /// Its name in the description.
+    pub name: &'a str,
+    /// In rad.
+    pub angle: f64,
+    /// In rad/s.
+    pub velocity: f64,
 }
 
 /// One shape of a body.
 #[derive(Debug)]
-struct Form {
+struct Collider {
     shape: Shape,
     carrier_from_shape: Isometry3<f64>,
     /// As rapier has it, with its place in the carrier.
@@ -85,52 +87,32 @@ struct Form {
 }
 
 #[derive(Debug)]
-struct Named {
+struct BodyRecord {
     name: String,
     part: Part,
+    /// The robot of which it is a link.
+    robot: Option<RobotId>,
     carrier: RigidBodyHandle,
-    forms: Vec<Form>,
+    colliders: Vec<Collider>,
 }
 
 #[derive(Debug)]
-struct Inhabitant {
+struct PlacedRobot {
     name: String,
     description: Robot,
     world_from_root: Isometry3<f64>,
     articulation: Articulation,
 }
 
-/// Everything there is.
+/// Robots and things, and the physics that moves them.
 pub struct World {
     options: WorldOptions,
     physics: PhysicsWorld,
-    inhabitants: Vec<Inhabitant>,
-    bodies: Vec<Named>,
+    robots: Vec<PlacedRobot>,
+    bodies: Vec<BodyRecord>,
     by_name: BTreeMap<String, BodyId>,
     ignored: Ignored,
     steps: u64,
-}
-
-/// Pairs of bodies that pass through each other.
-#[derive(Debug, Default)]
-struct Ignored(BTreeSet<(usize, usize)>);
-
-impl Ignored {
-    fn insert(&mut self, a: usize, b: usize) {
-        self.0.insert((a.min(b), a.max(b)));
-    }
-
-    fn contains(&self, a: usize, b: usize) -> bool {
-        self.0.contains(&(a.min(b), a.max(b)))
-    }
-}
-
-impl PhysicsHooks for Ignored {
-    fn filter_contact_pair(&self, context: &PairFilterContext) -> Option<SolverFlags> {
-        let body = |collider: ColliderHandle| context.colliders[collider].user_data as usize;
-        let ignored = self.contains(body(context.collider1), body(context.collider2));
-        (!ignored).then_some(SolverFlags::default())
-    }
 }
 
 impl std::fmt::Debug for World {
@@ -158,18 +140,18 @@ impl World {
         physics.integration_parameters.num_solver_iterations = options.substeps.max(1);
         // Its tolerance of 5 cm is a robot's hand here.
         physics.integration_parameters.contact_recycling = false;
-        let (inhabitants, bodies, by_name) = (Vec::new(), Vec::new(), BTreeMap::new());
-        Ok(Self { options, physics, inhabitants, bodies, by_name, ignored: Ignored::default(), steps: 0 })
+        let (robots, bodies, by_name) = (Vec::new(), Vec::new(), BTreeMap::new());
+        Ok(Self { options, physics, robots, bodies, by_name, ignored: Ignored::default(), steps: 0 })
     }
 
     /// Sets a robot into the world. Its root holds still.
     ///
     /// # Errors
-    /// [`Error::Taken`], [`Error::Length`] for a posture of another size, [`Error::Joint`] for an angle beyond its limits,
-    /// [`Error::Missing`] for a hand that is not there.
+    /// [`Error::Taken`], [`Error::Length`] for a posture of another size, [`Error::Joint`] for an angle beyond its limits or
+    /// a joint that the physics refuses, [`Error::Missing`] for a hand that is not there. The world is as before then.
     pub fn add_robot(&mut self, robot: &Robot, placement: &Placement<'_>) -> Result<RobotId> {
         let Placement { name, world_from_root, posture, part, hands } = placement;
-        if self.inhabitants.iter().any(|one| one.name == *name) {
+        if self.robots.iter().any(|one| one.name == *name) {
             return Err(Error::Taken((*name).to_owned()));
         }
         if posture.len() != robot.dof() {
@@ -185,14 +167,15 @@ impl World {
         for link in &robot.links {
             self.check_free(&format!("{name}/{}", link.name))?;
         }
-        let articulation = Articulation::insert(&mut self.physics, robot, world_from_root, posture);
+        let id = RobotId(self.robots.len());
+        let articulation = Articulation::insert(&mut self.physics, robot, world_from_root, posture)?;
         let mut own = Vec::new();
         for (index, link) in robot.links.iter().enumerate() {
             if !link.shapes.is_empty() {
                 let part = if hands.contains(&index) { Part::Hand } else { *part };
                 let (carrier, carrier_from_link) = articulation.links[index];
                 let shapes = link.shapes.iter().map(|(shape, place)| (shape.clone(), carrier_from_link * place));
-                own.push((index, self.insert(format!("{name}/{}", link.name), part, carrier, shapes)));
+                own.push((index, self.insert(format!("{name}/{}", link.name), part, Some(id), carrier, shapes)));
             }
         }
         for (a, &(link_a, body_a)) in own.iter().enumerate() {
@@ -203,8 +186,8 @@ impl World {
             }
         }
         let (name, description, world_from_root) = ((*name).to_owned(), robot.clone(), *world_from_root);
-        self.inhabitants.push(Inhabitant { name, description, world_from_root, articulation });
-        Ok(RobotId(self.inhabitants.len() - 1))
+        self.robots.push(PlacedRobot { name, description, world_from_root, articulation });
+        Ok(id)
     }
 
     /// Puts a thing into the world that stays where it is, unless it is [placed](World::place) elsewhere.
@@ -221,11 +204,12 @@ impl World {
         self.add(name, part, shape, RigidBodyBuilder::fixed().pose(to_pose(&world_from_shape)))
     }
 
-    /// Puts a thing into the world that is [led](World::lead) and pushes away what is in its way.
+    /// Puts a kinematic thing into the world: it goes where it is [told](World::move_kinematic), and pushes away what is in
+    /// its way.
     ///
     /// # Errors
     /// [`Error::Taken`].
-    pub fn add_led(
+    pub fn add_kinematic(
         &mut self,
         name: &str,
         part: Part,
@@ -249,7 +233,7 @@ impl World {
         link_from_shape: Isometry3<f64>,
     ) -> Result<BodyId> {
         self.check_free(name)?;
-        let Inhabitant { description, articulation, name: of, .. } = &self.inhabitants[robot.0];
+        let PlacedRobot { description, articulation, name: of, .. } = &self.robots[robot.0];
         let link = description.link(link)?;
         let (carrier, carrier_from_link) = articulation.links[link];
         // It may overlap what holds it, and whatever that may overlap.
@@ -261,8 +245,8 @@ impl World {
                 overlaps.push(body);
             }
         }
-        let body =
-            self.insert(name.to_owned(), part, carrier, std::iter::once((shape, carrier_from_link * link_from_shape)));
+        let shapes = std::iter::once((shape, carrier_from_link * link_from_shape));
+        let body = self.insert(name.to_owned(), part, None, carrier, shapes);
         overlaps.into_iter().for_each(|other| self.ignored.insert(body.0, other.0));
         Ok(body)
     }
@@ -280,8 +264,8 @@ impl World {
         }
     }
 
-    /// Moves a led thing within the next step.
-    pub fn lead(&mut self, body: BodyId, world_from_shape: &Isometry3<f64>) {
+    /// Moves a kinematic thing within the next step.
+    pub fn move_kinematic(&mut self, body: BodyId, world_from_shape: &Isometry3<f64>) {
         let carrier = self.bodies[body.0].carrier;
         if let Some(carrier) = self.physics.bodies.get_mut(carrier).filter(|carrier| carrier.is_kinematic()) {
             carrier.set_next_kinematic_position(to_pose(world_from_shape));
@@ -290,8 +274,8 @@ impl World {
 
     /// Sets where a joint is to go, within its limits.
     pub fn set_goal(&mut self, robot: RobotId, joint: usize, angle: f64) {
-        let limits = self.inhabitants[robot.0].description.limits(joint);
-        self.inhabitants[robot.0].articulation.motors[joint].goal = angle.clamp(limits.lower, limits.upper);
+        let limits = self.robots[robot.0].description.limits(joint);
+        self.robots[robot.0].articulation.motors[joint].goal = angle.clamp(limits.lower, limits.upper);
     }
 
     /// Sets where all joints are to go.
@@ -301,12 +285,12 @@ impl World {
 
     /// Makes a joint's motor stiffer or softer.
     pub fn set_servo(&mut self, robot: RobotId, joint: usize, servo: Servo) {
-        self.inhabitants[robot.0].articulation.set_servo(joint, servo);
+        self.robots[robot.0].articulation.set_servo(joint, servo);
     }
 
     /// One step.
     pub fn step(&mut self) {
-        for one in &mut self.inhabitants {
+        for one in &mut self.robots {
             one.articulation.drive(&mut self.physics, self.options.step);
         }
         self.physics.step_with_events(&self.ignored, &());
@@ -328,37 +312,47 @@ impl World {
     /// A robot's description.
     #[must_use]
     pub fn robot(&self, robot: RobotId) -> &Robot {
-        &self.inhabitants[robot.0].description
+        &self.robots[robot.0].description
     }
 
     /// Leads from a robot's root to the world.
     #[must_use]
     pub fn world_from_root(&self, robot: RobotId) -> Isometry3<f64> {
-        self.inhabitants[robot.0].world_from_root
+        self.robots[robot.0].world_from_root
     }
 
     /// True angles of a robot's joints.
     #[must_use]
     pub fn angles(&self, robot: RobotId) -> Vec<f64> {
-        self.inhabitants[robot.0].articulation.state(&self.physics).map(|[angle, _]| angle).collect()
+        self.robots[robot.0].articulation.state(&self.physics).map(|[angle, _]| angle).collect()
     }
 
     /// True velocities of a robot's joints, in rad/s.
     #[must_use]
     pub fn velocities(&self, robot: RobotId) -> Vec<f64> {
-        self.inhabitants[robot.0].articulation.state(&self.physics).map(|[_, velocity]| velocity).collect()
+        self.robots[robot.0].articulation.state(&self.physics).map(|[_, velocity]| velocity).collect()
+    }
+
+    /// How all joints stand that a robot's description calls movable. Those that are [locked](Robot::lock) hold still.
+    #[must_use]
+    pub fn joint_states(&self, robot: RobotId) -> Vec<JointState<'_>> {
+        let description = &self.robots[robot.0].description;
+        let velocities = self.velocities(robot);
+        let velocity = |name: &str| description.joint(name).map_or(0.0, |index| velocities[index]);
+        let angles = description.all_angles(&self.angles(robot));
+        angles.into_iter().map(|(name, angle)| JointState { name, angle, velocity: velocity(name) }).collect()
     }
 
     /// Where a robot's joints are to go.
     #[must_use]
     pub fn goals(&self, robot: RobotId) -> Vec<f64> {
-        self.inhabitants[robot.0].articulation.motors.iter().map(|motor| motor.goal).collect()
+        self.robots[robot.0].articulation.motors.iter().map(|motor| motor.goal).collect()
     }
 
     /// Leads from a link to the world; the index is the one in the robot's description.
     #[must_use]
     pub fn link(&self, robot: RobotId, link: usize) -> Isometry3<f64> {
-        let (carrier, carrier_from_link) = self.inhabitants[robot.0].articulation.links[link];
+        let (carrier, carrier_from_link) = self.robots[robot.0].articulation.links[link];
         from_pose(self.physics.bodies[carrier].position()) * carrier_from_link
     }
 
@@ -382,74 +376,26 @@ impl World {
     /// Leads from a thing's shape, or from the first shape of a link, to the world.
     #[must_use]
     pub fn pose(&self, body: BodyId) -> Isometry3<f64> {
-        let named = &self.bodies[body.0];
-        from_pose(self.physics.bodies[named.carrier].position()) * named.forms[0].carrier_from_shape
-    }
-
-    /// Distance of two bodies' surfaces, in metres; negative by as much as they overlap.
-    #[must_use]
-    pub fn gap(&self, a: BodyId, b: BodyId) -> f64 {
-        let (a, b) = (&self.bodies[a.0], &self.bodies[b.0]);
-        let place = |named: &Named, form: &Form| {
-            to_pose(&(from_pose(self.physics.bodies[named.carrier].position()) * form.carrier_from_physical))
-        };
-        let mut least = f64::INFINITY;
-        for form_a in &a.forms {
-            let at_a = place(a, form_a);
-            for form_b in &b.forms {
-                let (shape_a, shape_b) = (&*form_a.physical, &*form_b.physical);
-                let at_b = place(b, form_b);
-                let overlap = query::contact(&at_a, shape_a, &at_b, shape_b, 0.0).ok().flatten();
-                let distance =
-                    || query::distance(&at_a, shape_a, &at_b, shape_b).map_or(f64::INFINITY, |found| found.distance);
-                least = least.min(overlap.map_or_else(distance, |contact| contact.dist));
-            }
-        }
-        least
-    }
-
-    /// All pairs that touch after the last step, in the order in which their bodies came into the world.
-    #[must_use]
-    pub fn contacts(&self) -> Vec<Contact> {
-        let mut found: BTreeMap<[BodyId; 2], f64> = BTreeMap::new();
-        for pair in self.physics.contact_pairs() {
-            let body = |collider: ColliderHandle| BodyId(self.physics.colliders[collider].user_data as usize);
-            let (a, b) = (body(pair.collider1), body(pair.collider2));
-            if self.ignored.contains(a.0, b.0) {
-                continue;
-            }
-            *found.entry([a.min(b), a.max(b)]).or_default() += pair.total_impulse_magnitude() / self.options.step;
-        }
-        let touching = found.into_iter().filter_map(|(bodies, force)| {
-            let gap = self.gap(bodies[0], bodies[1]);
-            (gap <= 0.0).then_some(Contact { bodies, depth: -gap, force })
-        });
-        touching.collect()
-    }
-
-    /// Two links of a robot that touch though they should not, if there are any.
-    #[must_use]
-    pub fn self_collision(&self, robot: RobotId) -> Option<Contact> {
-        let own = format!("{}/", self.inhabitants[robot.0].name);
-        self.contacts().into_iter().find(|contact| contact.bodies.iter().all(|body| self.name(*body).starts_with(&own)))
+        let record = &self.bodies[body.0];
+        from_pose(self.physics.bodies[record.carrier].position()) * record.colliders[0].carrier_from_shape
     }
 
     /// All that can be seen now.
     #[must_use]
     pub fn scene(&self) -> Scene {
         let mut scene = Scene::default();
-        for named in &self.bodies {
-            let world_from_carrier = from_pose(self.physics.bodies[named.carrier].position());
-            for (index, form) in named.forms.iter().enumerate() {
+        for record in &self.bodies {
+            let world_from_carrier = from_pose(self.physics.bodies[record.carrier].position());
+            for (index, collider) in record.colliders.iter().enumerate() {
                 let name = match index {
-                    0 => named.name.clone(),
-                    _ => format!("{}.{index}", named.name),
+                    0 => record.name.clone(),
+                    _ => format!("{}.{index}", record.name),
                 };
-                let world_from_shape = world_from_carrier * form.carrier_from_shape;
-                scene.bodies.push(Body { name, part: named.part, shape: form.shape.clone(), world_from_shape });
+                let world_from_shape = world_from_carrier * collider.carrier_from_shape;
+                scene.bodies.push(Body { name, part: record.part, shape: collider.shape.clone(), world_from_shape });
             }
         }
-        for (index, one) in self.inhabitants.iter().enumerate() {
+        for (index, one) in self.robots.iter().enumerate() {
             for (link, description) in one.description.links.iter().enumerate() {
                 let name = format!("{}/{}", one.name, description.name);
                 scene.frames.push(Frame { name, world_from_frame: self.link(RobotId(index), link) });
@@ -468,18 +414,19 @@ impl World {
     fn add(&mut self, name: &str, part: Part, shape: Shape, builder: RigidBodyBuilder) -> Result<BodyId> {
         self.check_free(name)?;
         let carrier = self.physics.insert_body(builder);
-        Ok(self.insert(name.to_owned(), part, carrier, std::iter::once((shape, Isometry3::identity()))))
+        Ok(self.insert(name.to_owned(), part, None, carrier, std::iter::once((shape, Isometry3::identity()))))
     }
 
     fn insert(
         &mut self,
         name: String,
         part: Part,
+        robot: Option<RobotId>,
         carrier: RigidBodyHandle,
         shapes: impl Iterator<Item = (Shape, Isometry3<f64>)>,
     ) -> BodyId {
         let id = BodyId(self.bodies.len());
-        let forms = shapes.map(|(shape, carrier_from_shape)| {
+        let colliders = shapes.map(|(shape, carrier_from_shape)| {
             let (physical, shape_from_physical) = to_shape(&shape);
             let carrier_from_physical = carrier_from_shape * shape_from_physical;
             let collider = ColliderBuilder::new(physical.clone())
@@ -488,10 +435,10 @@ impl World {
                 .active_hooks(ActiveHooks::FILTER_CONTACT_PAIRS)
                 .user_data(id.0 as u128);
             self.physics.insert_collider(collider, Some(carrier));
-            Form { shape, carrier_from_shape, physical, carrier_from_physical }
+            Collider { shape, carrier_from_shape, physical, carrier_from_physical }
         });
-        let forms = forms.collect();
-        self.bodies.push(Named { name: name.clone(), part, carrier, forms });
+        let colliders = colliders.collect();
+        self.bodies.push(BodyRecord { name: name.clone(), part, robot, carrier, colliders });
         self.by_name.insert(name, id);
         id
     }

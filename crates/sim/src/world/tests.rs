@@ -40,7 +40,7 @@ fn links_are_where_forward_kinematics_say() {
                 - world.link(nao, index).translation.vector;
             assert!(
                 off.norm() < 1e-9,
-                "{} is off by {} m at moment {moment}",
+                "{} is off by {} m at time {moment}",
                 world.robot(nao).links[index].name,
                 off.norm()
             );
@@ -163,6 +163,63 @@ fn arms_stop_at_the_body_and_the_collision_is_seen() {
 }
 
 #[test]
+fn what_is_named_like_a_link_is_none() {
+    let (mut world, nao) = with_nao(&REST);
+    let effector = world.robot(nao).link("r_effector").unwrap();
+    let tip = Isometry3::from(world.link(nao, effector).translation.vector);
+    let ball = world.add_fixed("self/ball", Part::Object, Shape::Sphere { radius: 0.025 }, tip).unwrap();
+    world.step();
+    let hand = world.body("self/r_hand").unwrap();
+    assert!(world.contacts().iter().any(|contact| contact.bodies == [hand, ball]));
+    assert_eq!(world.self_collision(nao), None);
+    assert_eq!(world.contacts_of(nao), world.contacts());
+    assert!(world.is_link_of(hand, nao) && !world.is_link_of(ball, nao));
+}
+
+#[test]
+fn a_joint_that_the_physics_refuses_is_named_and_the_world_is_as_before() {
+    let mut robot = nao::load_one_armed().unwrap();
+    let joint = |name: &str| robot.joints.iter().position(|joint| joint.name == name).unwrap();
+    // Both would carry the forearm.
+    let (yaw, roll) = (joint("RElbowYaw"), joint("RElbowRoll"));
+    robot.joints[yaw].child = robot.joints[roll].child;
+    let placement = |robot: &Robot| robot.movable().map(|(_, l)| 0.0_f64.clamp(l.lower, l.upper)).collect::<Vec<_>>();
+    let posture = placement(&robot);
+    let mut world = World::new(WorldOptions::default()).unwrap();
+    let mut add = |robot: &Robot| {
+        let world_from_root = Isometry3::identity();
+        let hands = &["r_hand"];
+        world
+            .add_robot(robot, &Placement { name: "self", world_from_root, posture: &posture, part: Part::Robot, hands })
+    };
+    let message = add(&robot).unwrap_err().to_string();
+    assert!(message.starts_with("joint `RElbowRoll`: is refused by the physics"), "{message}");
+    // The name is free, and the world runs on.
+    let id = add(&nao::load_one_armed().unwrap()).unwrap();
+    run(&mut world, 0.1);
+    assert_eq!(world.angles(id).len(), 6);
+    assert!(world.angles(id).iter().all(|angle| angle.is_finite()));
+}
+
+#[test]
+fn every_joint_of_the_description_has_a_state_also_a_locked_one() {
+    let (mut world, nao) = with_nao(&REST);
+    world.set_goal(nao, 2, 0.8);
+    run(&mut world, 0.1);
+    let states = world.joint_states(nao);
+    let names: Vec<&str> = states.iter().map(|state| state.name).collect();
+    assert_eq!(names, nao::robot().joint_names());
+    let whole = nao::robot();
+    let q: Vec<f64> = states.iter().map(|state| state.angle).collect();
+    for (index, root_from_link) in whole.forward(&q).iter().enumerate() {
+        let off = (world.world_from_root(nao) * root_from_link).translation.vector
+            - world.link(nao, index).translation.vector;
+        assert!(off.norm() < 1e-9, "{} is off by {} m", whole.links[index].name, off.norm());
+    }
+    assert!(states[2].velocity > 0.5 && states[6..].iter().all(|state| state.velocity == 0.0), "{states:?}");
+}
+
+#[test]
 fn two_robots_share_a_world_and_one_can_hold_a_thing() {
     let (mut world, _) = with_nao(&REST);
     let robot = nao::load_one_armed().unwrap();
@@ -198,7 +255,7 @@ fn two_robots_share_a_world_and_one_can_hold_a_thing() {
 }
 
 #[test]
-fn a_led_thing_pushes_an_arm_away() {
+fn a_kinematic_thing_pushes_an_arm_away() {
     let (mut world, nao) = with_nao(&REST);
     let effector = world.robot(nao).link("r_effector").unwrap();
     let tip = world.link(nao, effector).translation.vector;
@@ -208,9 +265,9 @@ fn a_led_thing_pushes_an_arm_away() {
             UnitQuaternion::identity(),
         )
     };
-    let ball = world.add_led("ball", Part::Object, Shape::Sphere { radius: 0.025 }, place(0.0)).unwrap();
+    let ball = world.add_kinematic("ball", Part::Object, Shape::Sphere { radius: 0.025 }, place(0.0)).unwrap();
     for k in 1..=100 {
-        world.lead(ball, &place(f64::from(k) / 100.0));
+        world.move_kinematic(ball, &place(f64::from(k) / 100.0));
         world.step();
     }
     assert!((world.pose(ball).translation.vector - place(1.0).translation.vector).norm() < 1e-9);
@@ -241,8 +298,8 @@ fn the_same_calls_give_the_same_bits() {
 #[test]
 fn a_world_refuses_what_it_cannot_hold() {
     for step in [0.0, -0.005, f64::NAN, 0.2] {
-        let told = World::new(WorldOptions { step, ..WorldOptions::default() }).err().unwrap().to_string();
-        assert!(told.contains("length of a step") && told.contains("0.1 at most"), "{told}");
+        let message = World::new(WorldOptions { step, ..WorldOptions::default() }).err().unwrap().to_string();
+        assert!(message.contains("length of a step") && message.contains("0.1 at most"), "{message}");
     }
     let robot = nao::load_one_armed().unwrap();
     let mut world = World::new(WorldOptions::default()).unwrap();
@@ -250,16 +307,16 @@ fn a_world_refuses_what_it_cannot_hold() {
         let world_from_root = Isometry3::identity();
         world.add_robot(&robot, &Placement { name, world_from_root, posture, part: Part::Robot, hands: &["r_hand"] })
     };
-    let told = add("short", &REST[..5]).unwrap_err().to_string();
-    assert!(told.contains("posture") && told.contains('5') && told.contains('6'), "{told}");
+    let message = add("short", &REST[..5]).unwrap_err().to_string();
+    assert!(message.contains("posture") && message.contains('5') && message.contains('6'), "{message}");
     let mut twisted = REST;
     twisted[0] = 9.0;
-    let told = add("twisted", &twisted).unwrap_err().to_string();
-    assert!(told.contains("cannot start at 9 rad"), "{told}");
+    let message = add("twisted", &twisted).unwrap_err().to_string();
+    assert!(message.contains("cannot start at 9 rad"), "{message}");
     add("self", &REST).unwrap();
     assert!(add("self", &REST).unwrap_err().to_string().contains("self"));
-    let told = world.body("ball").unwrap_err().to_string();
-    assert!(told.contains("ball") && told.contains("self/r_hand"), "{told}");
+    let message = world.body("ball").unwrap_err().to_string();
+    assert!(message.contains("ball") && message.contains("self/r_hand"), "{message}");
     let ball = |world: &mut World| {
         world.add_fixed("ball", Part::Object, Shape::Sphere { radius: 0.1 }, Isometry3::translation(1.0, 0.0, 0.0))
     };
