@@ -12,13 +12,14 @@ use scrnn::network::Network;
 use scrnn::scaling::Scaling;
 use serde::Serialize;
 
+use super::interaction::{ARM, CHANNELS, Collision, Interaction, arm_postures};
+use super::order::{branchings, primitive_len};
 use crate::error::{Error, Result};
-use crate::interact::interaction::{ARM, CHANNELS, Collision, Interaction, arm_postures, branchings, primitive_len};
 use crate::robot::nao;
 
 /// A trained network as an interaction needs it.
 #[derive(Debug, Clone, Copy)]
-pub struct Mind<'a> {
+pub struct Controller<'a> {
     /// The network.
     pub network: &'a Network,
     /// Leads from the sensors' units to the network's.
@@ -40,11 +41,13 @@ pub fn with_own_arm(mut options: ErrorRegressionOptions) -> ErrorRegressionOptio
     options
 }
 
-/// One sample of an interaction.
+/// What was sensed, predicted and done at one sample of an interaction.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Moment {
+pub struct ControlStep {
     /// What was sensed, in pixels and radians.
     pub sensed: [f64; 8],
+    /// Whether the object was in view; if not, its channels hold what was sensed of it last.
+    pub object_in_view: bool,
     /// What the sample was predicted as, in the network's units; none before the first prediction.
     pub predicted: Option<[f64; 8]>,
     /// The variance that was predicted for it, in the network's units; empty without variance units.
@@ -53,7 +56,7 @@ pub struct Moment {
     pub context: Vec<f64>,
     /// What the regression did.
     pub regression: Regression,
-    /// E_t (D.3): where the arm is told to be, against where a tutor would lead it.
+    /// E_t (D.3): where the arm is sent, against where a tutor would lead it.
     pub error: f64,
     /// How far out the hand is: 1 to the left, -1 to the right.
     pub hand: f64,
@@ -91,41 +94,46 @@ pub struct Branch {
 /// A whole interaction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Followed {
-    /// All samples.
-    pub moments: Vec<Moment>,
+    /// Sample by sample.
+    pub steps: Vec<ControlStep>,
     /// All branchings.
     pub branches: Vec<Branch>,
 }
 
 /// Lets the network follow an order to its end. `observe` hands each sample to the regression, and may keep a deadline;
-/// `watch` sees the world at each sample, before time passes.
+/// `watch` sees the world at each sample, before time passes, and ends the interaction by an error of its own.
+///
+/// While the object is out of view, its channels hold what was sensed of it last, see [`Interaction::sense`]; the network is
+/// not told so, and goes on. [`ControlStep::object_in_view`] tells it to whoever looks on.
 ///
 /// # Errors
 /// [`Error::Length`] for a network of other channels, [`Error::Network`] for options out of their range, and what `observe`
-/// refuses.
-pub fn follow(
-    mind: &Mind<'_>,
+/// and `watch` refuse.
+pub fn follow<E: From<Error>>(
+    controller: &Controller<'_>,
     options: &ErrorRegressionOptions,
     interaction: &mut Interaction,
     mut observe: impl FnMut(&mut ErrorRegression, &[f64]) -> scrnn::error::Result<Regression>,
-    mut watch: impl FnMut(&Interaction, &Moment, &ErrorRegression),
-) -> Result<Followed> {
-    let channels = mind.network.topology.channels();
+    mut watch: impl FnMut(&Interaction, &ControlStep, &ErrorRegression) -> std::result::Result<(), E>,
+) -> std::result::Result<Followed, E> {
+    let channels = controller.network.topology.channels();
     if channels != CHANNELS.len() {
-        return Err(Error::Length { what: "the network's list of channels", found: channels, needed: CHANNELS.len() });
+        let what = "the network's list of channels";
+        return Err(Error::Length { what, found: channels, needed: CHANNELS.len() }.into());
     }
-    let Mind { network, scaling, initial_state, instruction_set } = *mind;
-    let mut regression = ErrorRegression::new(network, initial_state, options.clone(), instruction_set)?;
+    let Controller { network, scaling, initial_state, instruction_set } = *controller;
+    let mut regression =
+        ErrorRegression::new(network, initial_state, options.clone(), instruction_set).map_err(Error::from)?;
     let levels = hand_levels()?;
     let [centre, ..] = arm_postures();
     let mut arm = centre;
-    let mut moments: Vec<Moment> = Vec::with_capacity(interaction.samples());
+    let mut steps: Vec<ControlStep> = Vec::with_capacity(interaction.samples());
     for k in 0..interaction.samples() {
         let sensed = interaction.sense();
         let predicted = (k >= network.topology.delay()).then(|| array(regression.mean()));
         let variance = if predicted.is_some() { regression.variance().to_vec() } else { Vec::new() };
         let scaled: [f64; 8] = std::array::from_fn(|channel| scaling.to_scaled(channel, sensed[channel]));
-        let done = observe(&mut regression, &scaled)?;
+        let done = observe(&mut regression, &scaled).map_err(Error::from)?;
         if k + 1 >= network.topology.delay() {
             let mean = regression.mean();
             arm = std::array::from_fn(|joint| scaling.to_raw(ARM.start + joint, mean[ARM.start + joint]));
@@ -134,8 +142,9 @@ pub fn follow(
         let to_scaled = |angles: [f64; 4]| -> [f64; 4] {
             std::array::from_fn(|joint| scaling.to_scaled(ARM.start + joint, angles[joint]))
         };
-        let mut moment = Moment {
+        let mut step = ControlStep {
             sensed,
+            object_in_view: interaction.object_in_view(),
             predicted,
             variance,
             context: regression.context(regression.window()).to_vec(),
@@ -144,13 +153,13 @@ pub fn follow(
             hand: levels.out(interaction.hand_place().y),
             collision: None,
         };
-        watch(interaction, &moment, &regression);
+        watch(interaction, &step, &regression)?;
         interaction.step(arm);
-        moment.collision = interaction.collision();
-        moments.push(moment);
+        step.collision = interaction.collision();
+        steps.push(step);
     }
-    let branches = judge(&moments, interaction.order());
-    Ok(Followed { moments, branches })
+    let branches = judge(&steps, interaction.order());
+    Ok(Followed { steps, branches })
 }
 
 fn array(values: &[f64]) -> [f64; 8] {
@@ -171,16 +180,16 @@ fn hand_levels() -> Result<Levels> {
 
 /// What became of each branching: a collision counts first, then a move to the wrong side that begins in its primitive.
 #[must_use]
-fn judge(moments: &[Moment], order: &[Side]) -> Vec<Branch> {
+fn judge(steps: &[ControlStep], order: &[Side]) -> Vec<Branch> {
     let levels = Levels { centre: 0.0, left: 1.0, right: -1.0 };
-    let excursions = levels.excursions(moments.iter().map(|moment| moment.hand));
+    let excursions = levels.excursions(steps.iter().map(|step| step.hand));
     // The error of a sample is that of the next one's arm.
-    let errors: Vec<f64> = std::iter::once(0.0).chain(moments.iter().map(|moment| moment.error)).collect();
+    let errors: Vec<f64> = std::iter::once(0.0).chain(steps.iter().map(|step| step.error)).collect();
     let rule = ReactionRule::default();
     let one = |(&side, begin): (&Side, usize)| {
-        let end = (begin + primitive_len()).min(moments.len());
+        let end = (begin + primitive_len()).min(steps.len());
         let went = |to: Side| excursions.iter().any(|one| one.side == to && (begin..end).contains(&one.begins));
-        let collision = moments[begin..end].iter().find_map(|moment| moment.collision);
+        let collision = steps[begin..end].iter().find_map(|step| step.collision);
         let outcome = match collision {
             Some(_) => Outcome::Collision,
             None if went(side.other()) => Outcome::Opposite,

@@ -8,17 +8,18 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand::rngs::ChaCha8Rng;
-use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use scrnn::analysis::excursions::Side;
 use scrnn::dataset::Sequence;
 
+use super::order::{PERIOD, letters, out, samples};
 use crate::error::{Error, Result};
 use crate::robot::gaze::{Gaze, LaggingGaze};
 use crate::robot::joints::{HEAD, RIGHT_ARM};
 use crate::robot::nao;
+use crate::streams::{Purpose, stream};
 use crate::world::scene::{Part, Scene, Shape};
-use crate::world::{BodyId, Placement, RobotId, World, WorldOptions};
+use crate::world::{BodyId, JointState, Placement, RobotId, World, WorldOptions};
 
 /// Channels of a sample: the object's centre in the image, head and right arm of the self-robot.
 pub const CHANNELS: [&str; 8] =
@@ -26,13 +27,6 @@ pub const CHANNELS: [&str; 8] =
 
 /// Where the arm's angles stand in a sample.
 pub const ARM: std::ops::Range<usize> = 4..8;
-
-/// Seconds between samples.
-pub const PERIOD: f64 = 0.1;
-/// Samples before the first branching.
-pub const LEAD_IN: usize = 20;
-/// Samples of a primitive: out, hold, back, rest.
-pub const PRIMITIVE: [usize; 4] = [30, 20, 30, 10];
 
 /// Distance of the torsos, in metres.
 const DISTANCE: f64 = 0.43;
@@ -78,85 +72,6 @@ impl Default for InteractionOptions {
     }
 }
 
-/// Samples of a whole primitive.
-#[must_use]
-pub fn primitive_len() -> usize {
-    PRIMITIVE.iter().sum()
-}
-
-/// The sample at which the object begins to move for each branching.
-#[must_use]
-pub fn branchings(count: usize) -> Vec<usize> {
-    (0..count).map(|k| LEAD_IN + k * primitive_len()).collect()
-}
-
-/// Samples of an order.
-#[must_use]
-pub fn samples(order: &[Side]) -> usize {
-    LEAD_IN + order.len() * primitive_len()
-}
-
-/// All orders of `branches` primitives, left before right.
-#[must_use]
-pub fn all_orders(branches: usize) -> Vec<Vec<Side>> {
-    let side = |number: usize, branch: usize| match number >> (branches - 1 - branch) & 1 {
-        0 => Side::Left,
-        _ => Side::Right,
-    };
-    (0..1_usize << branches).map(|number| (0..branches).map(|branch| side(number, branch)).collect()).collect()
-}
-
-/// An order drawn at random; each side is left with probability `left`.
-#[must_use]
-pub fn random_order(branches: usize, left: f64, seed: u64) -> Vec<Side> {
-    let mut random = ChaCha8Rng::seed_from_u64(seed ^ ORDERS);
-    let side = |_| if random.random::<f64>() < left { Side::Left } else { Side::Right };
-    (0..branches).map(side).collect()
-}
-
-/// An order from its letters, e.g. `RLLLR`.
-///
-/// # Errors
-/// [`Error::Setting`] for an empty text or other letters.
-pub fn parse_order(text: &str) -> Result<Vec<Side>> {
-    let side = |letter: char| match letter {
-        'L' | 'l' => Some(Side::Left),
-        'R' | 'r' => Some(Side::Right),
-        _ => None,
-    };
-    let order: Option<Vec<Side>> = text.chars().map(side).collect();
-    order.filter(|order| !order.is_empty()).ok_or_else(|| Error::Setting {
-        what: "the order",
-        found: format!("`{text}`"),
-        needed: "letters L and R, one for each branching",
-    })
-}
-
-/// An order as letters.
-#[must_use]
-pub fn letters(order: &[Side]) -> String {
-    order.iter().map(|side| side.letter()).collect()
-}
-
-/// How far out the object is at a time in seconds, and to which side: 0 in the centre, 1 at the end.
-fn out(order: &[Side], seconds: f64) -> (f64, Side) {
-    let at = seconds / PERIOD - LEAD_IN as f64;
-    let branch = (at / primitive_len() as f64).floor().max(0.0) as usize;
-    let (Some(&side), true) = (order.get(branch), at > 0.0) else { return (0.0, Side::Left) };
-    let mut rest = at - (branch * primitive_len()) as f64;
-    let [to, hold, back, _] = PRIMITIVE.map(|steps| steps as f64);
-    let minimum_jerk = |s: f64| s * s * s * (10.0 + s * (6.0 * s - 15.0));
-    if rest < to {
-        return (minimum_jerk(rest / to), side);
-    }
-    rest -= to;
-    if rest < hold {
-        return (1.0, side);
-    }
-    rest -= hold;
-    (if rest < back { 1.0 - minimum_jerk(rest / back) } else { 0.0 }, side)
-}
-
 fn between(arm: &[[f64; 4]; 3], (share, side): (f64, Side)) -> [f64; 4] {
     let end = match side {
         Side::Left => &arm[1],
@@ -171,7 +86,7 @@ pub fn arm_postures() -> [[f64; 4]; 3] {
     SELF_ARM
 }
 
-/// Two robots and an object at one moment.
+/// Two robots and an object, as they are now.
 #[derive(Debug)]
 pub struct Interaction {
     world: World,
@@ -186,6 +101,9 @@ pub struct Interaction {
     camera: usize,
     effector: usize,
     hands: [BodyId; 2],
+    /// Where the object was in the image when it was seen last, truly and with the sensors' noise.
+    seen: [f64; 2],
+    sensed: [f64; 2],
     /// Samples taken.
     taken: usize,
     collision: Option<Collision>,
@@ -205,11 +123,17 @@ pub enum Collision {
 }
 
 impl Interaction {
-    /// Both robots with their arms in the centre; the head fixates the object.
+    /// Both robots with their arms in the centre; the head fixates the object. The sensors' noise is that of a trial: an
+    /// interaction that is [recorded](record) with the same seed draws other numbers, so that no network meets the noise
+    /// that it has learned.
     ///
     /// # Errors
     /// [`Error::Setting`] for senseless options.
     pub fn new(order: &[Side], options: &InteractionOptions, seed: u64) -> Result<Self> {
+        Self::with_noise(order, options, stream(seed, Purpose::TrialNoise, 0))
+    }
+
+    fn with_noise(order: &[Side], options: &InteractionOptions, random: ChaCha8Rng) -> Result<Self> {
         if let Some(bad) = options.noise.0.iter().find(|sd| !(**sd >= 0.0 && sd.is_finite())) {
             return Err(Error::Setting {
                 what: "a sensor's noise",
@@ -257,10 +181,11 @@ impl Interaction {
         let sphere = Shape::Sphere { radius: OBJECT.0 };
         let object = world.attach(other, "r_effector", "object", Part::Object, sphere, held)?;
         let hands = [world.body("self/r_hand")?, world.body("other/r_hand")?];
-        Ok(Self {
+        let centre = [nao::CAMERA.width / 2.0, nao::CAMERA.height / 2.0];
+        let mut interaction = Self {
             order: order.to_vec(),
             noise: options.noise,
-            random: ChaCha8Rng::seed_from_u64(seed ^ DOMAIN),
+            random,
             head: LaggingGaze { rate: HEAD_RATE, angles },
             camera: robot.link("camera_top")?,
             effector,
@@ -270,10 +195,15 @@ impl Interaction {
             object,
             gaze,
             hands,
+            seen: centre,
+            sensed: centre,
             taken: 0,
             collision: None,
             depth: 0.0,
-        })
+        };
+        interaction.look();
+        interaction.sensed = interaction.seen;
+        Ok(interaction)
     }
 
     /// Where the object goes, branching by branching.
@@ -289,11 +219,18 @@ impl Interaction {
     }
 
     /// What the self-robot senses now, in pixels and radians, with the sensors' noise.
+    ///
+    /// While the object is [out of view](Interaction::object_in_view), its channels repeat what was sensed of it last, as a
+    /// tracker does that has lost its object.
     pub fn sense(&mut self) -> [f64; 8] {
         let mut sample = self.truth();
         for (value, sd) in sample.iter_mut().zip(self.noise.0) {
             let z: f64 = StandardNormal.sample(&mut self.random);
             *value += sd * z;
+        }
+        match self.object_in_view() {
+            true => self.sensed = [sample[0], sample[1]],
+            false => [sample[0], sample[1]] = self.sensed,
         }
         sample
     }
@@ -303,9 +240,25 @@ impl Interaction {
     pub fn truth(&self) -> [f64; 8] {
         let angles = self.world.angles(self.own);
         let [yaw, pitch] = self.gaze.joints();
-        let seen = nao::CAMERA.project(&self.world.link(self.own, self.camera), &self.object_place());
-        let [x, y] = seen.unwrap_or([f64::NAN; 2]);
+        let [x, y] = self.seen;
         [x, y, angles[yaw], angles[pitch], angles[2], angles[3], angles[4], angles[5]]
+    }
+
+    /// Whether the object's centre lies in the image of the self-robot's camera. The head turns to the object by itself, so
+    /// that it always does in the experiments of the thesis.
+    #[must_use]
+    pub fn object_in_view(&self) -> bool {
+        self.object_in_image().is_some()
+    }
+
+    /// The object's centre in the image.
+    fn object_in_image(&self) -> Option<[f64; 2]> {
+        let world_from_camera = self.world.link(self.own, self.camera);
+        nao::CAMERA.project(&world_from_camera, &self.object_place()).filter(|place| nao::CAMERA.sees(*place))
+    }
+
+    fn look(&mut self) {
+        self.seen = self.object_in_image().unwrap_or(self.seen);
     }
 
     /// Where a tutor who knows the order leads the arm, one sample from now.
@@ -340,19 +293,16 @@ impl Interaction {
                 self.world.set_goal(self.other, 2 + joint, angle);
             }
             self.world.step();
-            self.look_for_collisions();
+            self.find_collisions();
         }
+        self.look();
         self.taken += 1;
     }
 
-    fn look_for_collisions(&mut self) {
-        for contact in self.world.contacts() {
-            let own = |body: BodyId| self.world.name(body).starts_with("self/");
-            let (mine, theirs) = match contact.bodies.map(own) {
-                [true, false] => (contact.bodies[0], contact.bodies[1]),
-                [false, true] => (contact.bodies[1], contact.bodies[0]),
-                _ => continue,
-            };
+    fn find_collisions(&mut self) {
+        for contact in self.world.contacts_of(self.own) {
+            let [a, b] = contact.bodies;
+            let (mine, theirs) = if self.world.is_link_of(a, self.own) { (a, b) } else { (b, a) };
             let kind = match (mine == self.hands[0], theirs) {
                 (true, body) if body == self.hands[1] => Collision::Hand,
                 (true, body) if body == self.object => Collision::Object,
@@ -400,6 +350,12 @@ impl Interaction {
         self.world.time()
     }
 
+    /// How all joints stand, of the self-robot and of the other one, those too that the experiment locks.
+    #[must_use]
+    pub fn joint_states(&self) -> [Vec<JointState<'_>>; 2] {
+        [self.own, self.other].map(|robot| self.world.joint_states(robot))
+    }
+
     /// Angles, and goals, of the self-robot's head and right arm.
     #[must_use]
     pub fn joints(&self) -> [Vec<f64>; 2] {
@@ -407,13 +363,16 @@ impl Interaction {
     }
 }
 
-/// Sets the sensors' noise apart from other noise of the same seed.
-const DOMAIN: u64 = 0x696E_7465_7261_6374;
+#[cfg(test)]
+impl Interaction {
+    /// From now on the head turns to the left and stays there.
+    pub(super) fn turn_away(&mut self) {
+        self.head = LaggingGaze { rate: 0.0, angles: [2.0, 0.0] };
+    }
+}
 
-/// Sets random orders apart.
-const ORDERS: u64 = 0x6F72_6465_7273_0000;
-
-/// Records the first `count` samples of an order with a tutored arm. `watch` sees the world at each of them.
+/// Records the first `count` samples of an order with a tutored arm. `watch` sees the world at each of them. The sensors'
+/// noise is not that of an [`Interaction`] with the same seed.
 ///
 /// # Errors
 /// [`Error::Setting`] for senseless options.
@@ -424,7 +383,7 @@ pub fn record(
     count: usize,
     mut watch: impl FnMut(&Interaction, &[f64; 8]),
 ) -> Result<Sequence> {
-    let mut interaction = Interaction::new(order, options, seed)?;
+    let mut interaction = Interaction::with_noise(order, options, stream(seed, Purpose::RecordedNoise, 0))?;
     let count = count.min(samples(order));
     let mut values = Vec::with_capacity(count * CHANNELS.len());
     for _ in 0..count {

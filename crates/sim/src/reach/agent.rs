@@ -6,9 +6,8 @@
 //! ```
 //!
 //! The prediction of the arm's next sample is where its joints go. Whatever decides that is a [`Driver`]: the network, or
-//! what it is compared with. This is the only file in which a network meets the world.
+//! what it is compared with. Here a network meets the world.
 
-use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use scrnn::analysis::mixture::MixtureRegression;
@@ -20,7 +19,8 @@ use scrnn::scaling::Scaling;
 use crate::error::{Error, Result};
 use crate::reach::channels::{ARM, REACHING, VISION};
 use crate::reach::stage::{Stage, retracted_arm, samples_to_steps};
-use crate::reach::touching::{Cycle, Watch};
+use crate::reach::touching::{Cycle, TouchDetector};
+use crate::streams::{Purpose, stream};
 use crate::world::WorldOptions;
 
 /// What is expected of the next sample, and where the arm is to go, by channel in rad.
@@ -101,7 +101,7 @@ impl NetworkDriver {
                 return Err(Error::Length { what: "the constant variance", found: variance.len(), needed: channels });
             }
             Noise::Constant(variance) => {
-                Some((variance.iter().map(|v| v.sqrt()).collect(), ChaCha8Rng::seed_from_u64(seed)))
+                Some((variance.iter().map(|v| v.sqrt()).collect(), stream(seed, Purpose::ConstantNoise, 0)))
             }
             _ => None,
         };
@@ -188,7 +188,7 @@ impl MixtureDriver {
     /// regression's covariance is added.
     #[must_use]
     pub fn new(regression: MixtureRegression, cycle: usize, noise: Option<u64>) -> Self {
-        Self { regression, cycle, at: 0, random: noise.map(ChaCha8Rng::seed_from_u64) }
+        Self { regression, cycle, at: 0, random: noise.map(|seed| stream(seed, Purpose::MixtureNoise, 0)) }
     }
 
     /// What is given for sample `at`: the phase within the metronome's beat, from 0 to 1, then the head's angles.
@@ -249,14 +249,14 @@ pub struct Performed {
     pub self_collisions: usize,
 }
 
-/// What an observer is shown.
+/// The stage between two steps of the world, as an observer sees it.
 #[derive(Debug)]
-pub struct Glimpse<'a> {
+pub struct Snapshot<'a> {
     /// The stage as it is.
     pub stage: &'a Stage,
-    /// Where the joints are led at this moment, by channel.
+    /// Where the joints are led now, by channel.
     pub goals: Vec<f64>,
-    /// What was sensed and decided, if this is the moment of a sample.
+    /// What was sensed and decided, if this is a sample.
     pub decision: Option<(&'a [f64], &'a Decision)>,
     /// The number of a cycle, from 0, of which this is the first contact.
     pub contact: Option<usize>,
@@ -269,24 +269,24 @@ pub struct Glimpse<'a> {
 pub fn perform<E: From<Error>>(
     performance: &Performance,
     driver: &mut dyn Driver,
-    observer: &mut dyn FnMut(&Glimpse<'_>) -> std::result::Result<(), E>,
+    observer: &mut dyn FnMut(&Snapshot<'_>) -> std::result::Result<(), E>,
 ) -> std::result::Result<Performed, E> {
     let Performance { y, samples, shift, frozen, world } = performance;
     let robot = crate::robot::nao::load_one_armed()?;
     let steps = samples_to_steps(world)?;
     let mut arm = retracted_arm(&robot, *y)?;
     let mut stage = Stage::new(*world, *y, &arm, *frozen)?;
-    let mut watch = Watch::default();
+    let mut detector = TouchDetector::default();
     let mut performed = Performed::default();
     for sample in 0..*samples {
         if let Some((_, to)) = shift.filter(|(at, _)| *at == sample) {
             stage.move_sphere(to)?;
-            watch.interrupt();
+            detector.interrupt();
         }
         let sensed = stage.angles();
         let decision = driver.decide(&sensed)?;
         let goals = stage.world.goals(stage.robot());
-        observer(&Glimpse { stage: &stage, goals, decision: Some((&sensed, &decision)), contact: None })?;
+        observer(&Snapshot { stage: &stage, goals, decision: Some((&sensed, &decision)), contact: None })?;
         let mut target = decision.target;
         for (joint, angle) in target.iter_mut().enumerate() {
             let limits = robot.limits(VISION + joint);
@@ -300,25 +300,25 @@ pub fn perform<E: From<Error>>(
             let share = step as f64 / steps as f64;
             let way: [f64; 4] = std::array::from_fn(|joint| arm[joint] + share * (target[joint] - arm[joint]));
             stage.step(&way);
-            let contact = watch.observe(stage.moment());
+            let contact = detector.observe(stage.hand_state());
             collided |= step % 5 == 0 && stage.world.self_collision(stage.robot()).is_some();
             let goals = stage.world.goals(stage.robot());
-            observer(&Glimpse { stage: &stage, goals, decision: None, contact })?;
+            observer(&Snapshot { stage: &stage, goals, decision: None, contact })?;
         }
         performed.self_collisions += usize::from(collided);
         performed.sensed.extend(sensed);
         performed.decisions.push(decision);
         arm = target;
     }
-    performed.cycles = watch.finish();
+    performed.cycles = detector.finish();
     Ok(performed)
 }
 
-/// Performs without anybody looking on.
+/// Performs without an observer.
 ///
 /// # Errors
 /// As [`perform`].
-pub fn perform_unseen(performance: &Performance, driver: &mut dyn Driver) -> Result<Performed> {
+pub fn perform_unobserved(performance: &Performance, driver: &mut dyn Driver) -> Result<Performed> {
     perform(performance, driver, &mut |_| Ok::<(), Error>(()))
 }
 

@@ -31,7 +31,7 @@ fn driver(noise: &Noise) -> NetworkDriver {
 
 #[test]
 fn an_arm_that_goes_where_it_was_taught_touches_every_time() {
-    let performed = perform_unseen(&performance(5 * CYCLE), &mut ideal(POSITIONS[1])).unwrap();
+    let performed = perform_unobserved(&performance(5 * CYCLE), &mut ideal(POSITIONS[1])).unwrap();
     assert_eq!(performed.cycles.len(), 5);
     assert!(performed.cycles.iter().all(|cycle| cycle.touched && cycle.retracted));
     assert_eq!((performed.beyond_limits, performed.self_collisions), (0, 0));
@@ -40,11 +40,11 @@ fn an_arm_that_goes_where_it_was_taught_touches_every_time() {
 
 #[test]
 fn an_arm_that_goes_for_another_place_does_not() {
-    let performed = perform_unseen(&performance(3 * CYCLE), &mut ideal(POSITIONS[1] + 0.035)).unwrap();
+    let performed = perform_unobserved(&performance(3 * CYCLE), &mut ideal(POSITIONS[1] + 0.035)).unwrap();
     assert!(performed.cycles.iter().all(|cycle| !cycle.touched), "{:?}", performed.cycles);
     // Nor does one whose sphere is taken away on the way.
     let shifted = Performance { shift: Some((CYCLE, POSITIONS[0])), ..performance(3 * CYCLE) };
-    let performed = perform_unseen(&shifted, &mut ideal(POSITIONS[1])).unwrap();
+    let performed = perform_unobserved(&shifted, &mut ideal(POSITIONS[1])).unwrap();
     assert!(performed.cycles[0].touched && performed.cycles.iter().skip(1).all(|cycle| !cycle.touched));
 }
 
@@ -52,7 +52,7 @@ fn an_arm_that_goes_for_another_place_does_not() {
 fn the_head_follows_the_sphere_unless_it_is_frozen() {
     let robot = nao::load_one_armed().unwrap();
     let off = |performance: &Performance, y: f64| {
-        let performed = perform_unseen(performance, &mut ideal(POSITIONS[1])).unwrap();
+        let performed = perform_unobserved(performance, &mut ideal(POSITIONS[1])).unwrap();
         let last = &performed.sensed[performed.sensed.len() - 6..];
         last[..2].iter().zip(gaze_at(&robot, y).unwrap()).map(|(q, goal)| (q - goal).abs()).fold(0.0, f64::max)
     };

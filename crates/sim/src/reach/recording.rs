@@ -2,7 +2,7 @@
 
 use std::io::{Seek, Write};
 
-use crate::reach::agent::Glimpse;
+use crate::reach::agent::Snapshot;
 use crate::reach::channels::REACHING;
 use crate::reach::stage::Stage;
 use crate::recording::{Contact, Heading, Joint, Recorder, RecordingError, Robot};
@@ -29,22 +29,24 @@ impl<W: Write + Seek> std::fmt::Debug for ReachingRecording<W> {
 
 /// What is kept of one sample of a demonstration.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Look {
+pub struct DemonstrationSample {
     /// Seconds since the demonstration began.
     pub time: f64,
     /// What the robot sensed, by channel.
     pub sensed: Vec<f64>,
-    /// True angles.
-    pub angles: Vec<f64>,
+    /// Name and true angle of every joint that the robot's description calls movable.
+    pub joints: Vec<(String, f64)>,
     /// All that can be seen.
     pub scene: Scene,
 }
 
-impl Look {
+impl DemonstrationSample {
     /// At the stage as it is.
     #[must_use]
     pub fn at(stage: &Stage, sensed: &[f64]) -> Self {
-        Self { time: stage.world.time(), sensed: sensed.to_vec(), angles: stage.angles(), scene: stage.world.scene() }
+        let states = stage.world.joint_states(stage.robot());
+        let joints = states.into_iter().map(|state| (state.name.to_owned(), state.angle)).collect();
+        Self { time: stage.world.time(), sensed: sensed.to_vec(), joints, scene: stage.world.scene() }
     }
 }
 
@@ -52,7 +54,7 @@ fn nanoseconds(seconds: f64) -> u64 {
     (seconds * 1e9).round() as u64
 }
 
-fn joints(angles: &[f64]) -> Vec<Joint<'static>> {
+fn targets(angles: &[f64]) -> Vec<Joint<'static>> {
     REACHING.iter().zip(angles).map(|(name, &angle)| Joint::at(name, angle)).collect()
 }
 
@@ -82,41 +84,38 @@ impl<W: Write + Seek> ReachingRecording<W> {
     ///
     /// # Errors
     /// As the [`Recorder`]'s.
-    pub fn look(&mut self, look: &Look) -> Result<(), RecordingError> {
-        let time = nanoseconds(self.begun + look.time);
-        self.recorder.joint_states(time, &joints(&look.angles))?;
-        self.recorder.sensed(time, &look.sensed)?;
-        self.recorder.scene(time, &look.scene)
+    pub fn demonstration(&mut self, sample: &DemonstrationSample) -> Result<(), RecordingError> {
+        let time = nanoseconds(self.begun + sample.time);
+        let joints: Vec<Joint<'_>> = sample.joints.iter().map(|(name, angle)| Joint::at(name, *angle)).collect();
+        self.recorder.joint_states(time, &joints)?;
+        self.recorder.sensed(time, &sample.sensed)?;
+        self.recorder.scene(time, &sample.scene)
     }
 
-    /// One moment of a performance.
+    /// One snapshot of a performance.
     ///
     /// # Errors
     /// As the [`Recorder`]'s.
-    pub fn glimpse(&mut self, glimpse: &Glimpse<'_>) -> Result<(), RecordingError> {
-        let stage = glimpse.stage;
+    pub fn snapshot(&mut self, snapshot: &Snapshot<'_>) -> Result<(), RecordingError> {
+        let stage = snapshot.stage;
         let time = nanoseconds(self.begun + stage.world.time());
-        if let Some((sensed, decision)) = glimpse.decision {
+        if let Some((sensed, decision)) = snapshot.decision {
             self.recorder.sensed(time, sensed)?;
             let variance = Some(decision.variance.as_slice()).filter(|variance| !variance.is_empty());
             self.recorder.predicted(time, &decision.mean, variance)?;
         }
-        if let Some(cycle) = glimpse.contact {
-            let moment = stage.moment();
-            let values = [("cycle", cycle as f64 + 1.0), ("gap", moment.gap), ("aim", moment.aim)];
+        if let Some(cycle) = snapshot.contact {
+            let hand = stage.hand_state();
+            let values = [("cycle", cycle as f64 + 1.0), ("gap", hand.gap), ("aim", hand.aim)];
             self.recorder.event(time, "touch", &values)?;
         }
         if stage.world.time() + 1e-9 < self.pictures as f64 * PICTURES {
             return Ok(());
         }
         self.pictures += 1;
-        let velocities = stage.world.velocities(stage.robot());
-        let states = REACHING
-            .iter()
-            .zip(stage.angles().into_iter().zip(velocities))
-            .map(|(name, (position, velocity))| Joint { name, position, velocity: Some(velocity), effort: None });
-        self.recorder.joint_states(time, &states.collect::<Vec<_>>())?;
-        self.recorder.joint_targets(time, &joints(&glimpse.goals))?;
+        let states = stage.world.joint_states(stage.robot());
+        self.recorder.joint_states(time, &states.into_iter().map(Joint::from).collect::<Vec<_>>())?;
+        self.recorder.joint_targets(time, &targets(&snapshot.goals))?;
         let contacts = stage.world.contacts();
         let contacts = contacts.iter().map(|contact| Contact {
             a: stage.world.name(contact.bodies[0]),
@@ -145,7 +144,8 @@ mod tests {
     use crate::error::Error;
     use crate::reach::agent::{Performance, Replay, perform};
     use crate::reach::stage::{POSITIONS, retracted_arm, touching_arm};
-    use crate::reach::tutor::{Tutoring, demonstrate_and_look};
+    use crate::reach::tutor::{Tutoring, demonstrate_with};
+    use crate::recording::reading::Last;
     use crate::robot::nao::load_one_armed;
     use crate::world::WorldOptions;
 
@@ -173,8 +173,8 @@ mod tests {
         let mut recording =
             ReachingRecording::new(Cursor::new(Vec::new()), Some("name = \"x\""), &[("seed", "1")]).unwrap();
         recording.begin_sequence(0.0, "here").unwrap();
-        let mut look = |glimpse: &Glimpse<'_>| Ok::<(), Failed>(recording.glimpse(glimpse)?);
-        let performed = perform(&performance, &mut driver, &mut look).unwrap();
+        let mut observe = |snapshot: &Snapshot<'_>| Ok::<(), Failed>(recording.snapshot(snapshot)?);
+        let performed = perform(&performance, &mut driver, &mut observe).unwrap();
         assert!(performed.cycles.iter().any(|cycle| cycle.touched), "{:?}", performed.cycles);
         recording.finish().unwrap().into_inner()
     }
@@ -193,14 +193,29 @@ mod tests {
     }
 
     #[test]
+    fn joint_states_and_description_place_every_link_where_its_frame_is() {
+        let off = |bytes: &[u8]| Last::of(bytes).farthest(&nao::load().unwrap(), "self/", "");
+        assert!(off(&performance()) < 1e-9, "{}", off(&performance()));
+        let tutoring = Tutoring { sequences: 1, samples: 2, ..Tutoring::default() };
+        let all = demonstrate_with(&tutoring, 1, 1, &DemonstrationSample::at).unwrap();
+        let mut recording = ReachingRecording::new(Cursor::new(Vec::new()), None, &[]).unwrap();
+        all[0].1.iter().for_each(|sample| recording.demonstration(sample).unwrap());
+        let bytes = recording.finish().unwrap().into_inner();
+        assert!(off(&bytes) < 1e-9, "{}", off(&bytes));
+    }
+
+    #[test]
     fn demonstrations_follow_each_other_in_time() {
         let tutoring = Tutoring { sequences: 2, samples: 3, ..Tutoring::default() };
-        let all = demonstrate_and_look(&tutoring, 1, 2, &Look::at).unwrap();
+        let all = demonstrate_with(&tutoring, 1, 2, &DemonstrationSample::at).unwrap();
         let mut recording = ReachingRecording::new(Cursor::new(Vec::new()), None, &[]).unwrap();
-        for (index, (demonstration, looks)) in all.iter().enumerate() {
+        for (index, (demonstration, samples)) in all.iter().enumerate() {
             recording.begin_sequence(10.0 * index as f64, "some").unwrap();
-            assert_eq!(looks.iter().flat_map(|look| look.sensed.clone()).collect::<Vec<_>>(), demonstration.samples);
-            looks.iter().for_each(|look| recording.look(look).unwrap());
+            assert_eq!(
+                samples.iter().flat_map(|sample| sample.sensed.clone()).collect::<Vec<_>>(),
+                demonstration.samples
+            );
+            samples.iter().for_each(|sample| recording.demonstration(sample).unwrap());
         }
         assert!(!recording.finish().unwrap().into_inner().is_empty());
     }

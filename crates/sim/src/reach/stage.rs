@@ -4,16 +4,16 @@
 //! ahead of the robot. The head keeps the sphere in the centre of its lower camera, whatever the arm does.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use rand::rngs::ChaCha8Rng;
-use rand::{RngExt, SeedableRng};
+use rand::RngExt;
 
 use crate::error::{Error, Result};
-use crate::reach::touching::Moment;
+use crate::reach::touching::HandState;
 use crate::robot::Robot;
 use crate::robot::gaze::Gaze;
 use crate::robot::joints::RIGHT_ARM;
 use crate::robot::kinematics::InverseKinematics;
 use crate::robot::nao;
+use crate::streams::{Purpose, stream};
 use crate::world::scene::{Part, Shape};
 use crate::world::{BodyId, Placement, RobotId, World, WorldOptions};
 
@@ -47,9 +47,6 @@ const TOUCHING: [[f64; 4]; 3] =
 /// to the right that the shoulder comes near its limit.
 pub const RETRACTION: [f64; 4] = [-0.66, -0.15, 0.70, -0.55];
 
-/// Sets the numbers of drawn places apart from a seed's others.
-const PLACES: u64 = 0x706C_6163_6573;
-
 /// Height of the torso's origin over the floor, of a standing NAO.
 const STANDING: f64 = 0.333_09;
 
@@ -71,7 +68,7 @@ pub fn samples_to_steps(options: &WorldOptions) -> Result<usize> {
 /// The robot, the bench and the sphere.
 #[derive(Debug)]
 pub struct Stage {
-    /// Everything that moves or can be met.
+    /// The robot, the bench and the sphere in it.
     pub world: World,
     robot: RobotId,
     gaze: Gaze,
@@ -142,14 +139,14 @@ impl Stage {
         self.world.angles(self.robot)
     }
 
-    /// How the hand stands to the sphere now.
+    /// Where the hand is, and how far from the sphere.
     #[must_use]
-    pub fn moment(&self) -> Moment {
+    pub fn hand_state(&self) -> HandState {
         let tip = Point3::from(self.world.link(self.robot, self.effector).translation.vector);
         let hand = self.world.world_from_root(self.robot).inverse_transform_point(&tip);
         let expected = touching_hand(self.y);
         let gap = self.world.gap(self.hand, self.sphere);
-        Moment { time: self.world.time(), gap, aim: (hand - expected).norm(), hand: hand.coords.into() }
+        HandState { time: self.world.time(), gap, aim: (hand - expected).norm(), hand: hand.coords.into() }
     }
 }
 
@@ -223,7 +220,7 @@ pub fn gaze_at(robot: &Robot, y: f64) -> Result<[f64; 2]> {
 /// Places drawn evenly between positions 1 and 3.
 #[must_use]
 pub fn places_between(seed: u64, count: usize) -> Vec<f64> {
-    let mut random = ChaCha8Rng::seed_from_u64(seed ^ PLACES);
+    let mut random = stream(seed, Purpose::Places, 0);
     (0..count).map(|_| random.random_range(POSITIONS[0]..POSITIONS[2])).collect()
 }
 
@@ -236,8 +233,8 @@ mod tests {
         let steps = |step| samples_to_steps(&WorldOptions { step, ..WorldOptions::default() });
         assert_eq!((steps(0.005).unwrap(), steps(0.5).unwrap()), (100, 1));
         for step in [0.003, 0.7, f64::NAN] {
-            let told = steps(step).unwrap_err().to_string();
-            assert!(told.contains(&format!("{step} s")) && told.contains("a part of 0.5 s"), "{told}");
+            let message = steps(step).unwrap_err().to_string();
+            assert!(message.contains(&format!("{step} s")) && message.contains("a part of 0.5 s"), "{message}");
         }
     }
 
@@ -247,8 +244,8 @@ mod tests {
         let new = |y| Stage::new(WorldOptions::default(), y, &arm, None);
         assert!(new(0.1).err().unwrap().to_string().contains("0.1 m"));
         let mut stage = new(POSITIONS[1]).unwrap();
-        let before = stage.moment().gap;
+        let before = stage.hand_state().gap;
         assert!(stage.move_sphere(f64::NAN).is_err());
-        assert_eq!(stage.moment().gap, before);
+        assert_eq!(stage.hand_state().gap, before);
     }
 }

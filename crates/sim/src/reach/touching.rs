@@ -15,9 +15,9 @@ const NEAR: f64 = 0.060;
 const FAR: f64 = 0.090;
 const RETRACTED: f64 = 0.100;
 
-/// How the hand stands to the sphere at one moment.
+/// Where the hand is, and how far from the sphere, at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Moment {
+pub struct HandState {
     /// In seconds.
     pub time: f64,
     /// Between hand and sphere, in metres; negative by as much as they overlap.
@@ -31,47 +31,47 @@ pub struct Moment {
 /// One touch and retraction.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Cycle {
-    /// The moment of the smallest gap.
-    pub touch: Moment,
+    /// The hand when the gap was smallest.
+    pub touch: HandState,
     /// Whether it was a touch.
     pub touched: bool,
-    /// The moment of the largest gap before the next cycle, unless the movement ended near the sphere.
-    pub retraction: Option<Moment>,
+    /// The hand when the gap was largest before the next cycle, unless the movement ended near the sphere.
+    pub retraction: Option<HandState>,
     /// Whether the hand went far enough away.
     pub retracted: bool,
 }
 
-/// Looks on, moment by moment.
+/// Finds touches and retractions in the states of the hand as they come.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Watch {
+pub struct TouchDetector {
     cycles: Vec<Cycle>,
     near: bool,
 }
 
-impl Watch {
-    /// Takes in the next moment. Gives the cycle's number, from 0, if this is the moment of its first contact.
-    pub fn observe(&mut self, moment: Moment) -> Option<usize> {
-        if !self.near && moment.gap < NEAR {
+impl TouchDetector {
+    /// Takes in the next state. Gives the cycle's number, from 0, if this is its first contact.
+    pub fn observe(&mut self, state: HandState) -> Option<usize> {
+        if !self.near && state.gap < NEAR {
             self.near = true;
-            self.cycles.push(Cycle { touch: moment, touched: false, retraction: None, retracted: false });
+            self.cycles.push(Cycle { touch: state, touched: false, retraction: None, retracted: false });
         }
         let number = self.cycles.len().checked_sub(1)?;
         let cycle = &mut self.cycles[number];
-        if self.near && moment.gap > FAR {
+        if self.near && state.gap > FAR {
             self.near = false;
         }
         if self.near {
-            if moment.gap < cycle.touch.gap {
-                cycle.touch = moment;
+            if state.gap < cycle.touch.gap {
+                cycle.touch = state;
             }
-            let contact = moment.gap <= CONTACT && moment.aim <= AIM;
+            let contact = state.gap <= CONTACT && state.aim <= AIM;
             let first = contact && !cycle.touched;
             cycle.touched |= contact;
             return first.then_some(number);
         }
-        if cycle.retraction.is_none_or(|farthest| moment.gap > farthest.gap) {
-            cycle.retraction = Some(moment);
-            cycle.retracted |= moment.gap > RETRACTED;
+        if cycle.retraction.is_none_or(|farthest| state.gap > farthest.gap) {
+            cycle.retraction = Some(state);
+            cycle.retracted |= state.gap > RETRACTED;
         }
         None
     }
@@ -107,19 +107,19 @@ pub fn spread<'a>(points: impl IntoIterator<Item = &'a [f64; 3]>) -> Option<f64>
 mod tests {
     use super::*;
 
-    fn watch(gaps: &[(f64, f64)]) -> (Vec<Cycle>, Vec<usize>) {
-        let mut watch = Watch::default();
+    fn detect(gaps: &[(f64, f64)]) -> (Vec<Cycle>, Vec<usize>) {
+        let mut detector = TouchDetector::default();
         let mut contacts = Vec::new();
         for (k, &(gap, aim)) in gaps.iter().enumerate() {
-            let moment = Moment { time: k as f64, gap, aim, hand: [0.0; 3] };
-            contacts.extend(watch.observe(moment));
+            let state = HandState { time: k as f64, gap, aim, hand: [0.0; 3] };
+            contacts.extend(detector.observe(state));
         }
-        (watch.finish(), contacts)
+        (detector.finish(), contacts)
     }
 
     #[test]
     fn a_cycle_runs_from_near_to_far_and_may_hesitate_between() {
-        let (cycles, contacts) = watch(&[
+        let (cycles, contacts) = detect(&[
             (0.15, 0.1),
             (0.05, 0.02),
             (0.004, 0.01),
@@ -140,19 +140,19 @@ mod tests {
 
     #[test]
     fn a_graze_elsewhere_is_no_touch() {
-        let (cycles, contacts) = watch(&[(0.1, 0.1), (-0.002, 0.03), (0.02, 0.01), (0.1, 0.1)]);
+        let (cycles, contacts) = detect(&[(0.1, 0.1), (-0.002, 0.03), (0.02, 0.01), (0.1, 0.1)]);
         assert!(!cycles[0].touched && contacts.is_empty());
     }
 
     #[test]
     fn a_sphere_that_is_taken_away_ends_the_cycle() {
-        let mut watch = Watch::default();
-        let moment = |time, gap, aim| Moment { time, gap, aim, hand: [0.0; 3] };
-        assert_eq!(watch.observe(moment(0.0, 0.001, 0.001)), Some(0));
-        watch.interrupt();
+        let mut detector = TouchDetector::default();
+        let state = |time, gap, aim| HandState { time, gap, aim, hand: [0.0; 3] };
+        assert_eq!(detector.observe(state(0.0, 0.001, 0.001)), Some(0));
+        detector.interrupt();
         // It lies now where the hand overlaps it, but not as it was taught to.
-        assert_eq!(watch.observe(moment(1.0, -0.014, 0.05)), None);
-        let cycles = watch.finish();
+        assert_eq!(detector.observe(state(1.0, -0.014, 0.05)), None);
+        let cycles = detector.finish();
         assert_eq!((cycles.len(), cycles[0].touched, cycles[0].touch.time, cycles[1].touched), (2, true, 0.0, false));
     }
 

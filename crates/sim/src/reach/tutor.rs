@@ -6,7 +6,7 @@
 //! millimetres; the arm after each retraction; and on the way a slow wander, which fades near the touch.
 
 use rand::rngs::ChaCha8Rng;
-use rand::{Rng, RngExt, SeedableRng};
+use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 use scrnn::dataset::{Dataset, Sequence};
 
@@ -14,10 +14,11 @@ use crate::error::{Error, Result};
 use crate::parallel::in_parallel;
 use crate::reach::channels::REACHING;
 use crate::reach::stage::{CYCLE, CYCLES, PERIOD, POSITIONS, RETRACTION, Stage, samples_to_steps, touching_arm};
-use crate::reach::touching::{Cycle, Watch};
+use crate::reach::touching::{Cycle, TouchDetector};
 use crate::robot::Robot;
 use crate::robot::joints::RIGHT_ARM;
 use crate::robot::nao;
+use crate::streams::{Purpose, stream};
 use crate::world::{Servo, WorldOptions};
 
 /// What the tutor does, and how well.
@@ -65,9 +66,6 @@ const CALM: f64 = 0.5;
 const ARM_NOISE: f64 = 0.002;
 const HEAD_NOISE: f64 = 0.005;
 
-/// Sets the tutor's numbers apart from those that initial weights and generation's noise are drawn with.
-const DOMAIN: u64 = 0x7475_746F_7269_6E67;
-
 /// One sequence of touches at one place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Demonstration {
@@ -86,7 +84,7 @@ pub struct Demonstration {
 /// # Errors
 /// [`Error::Setting`] for nothing to demonstrate, or a placement beyond the bench.
 pub fn demonstrate(tutoring: &Tutoring, seed: u64, threads: usize) -> Result<Vec<Demonstration>> {
-    let all = demonstrate_and_look(tutoring, seed, threads, &|_, _| ())?;
+    let all = demonstrate_with(tutoring, seed, threads, &|_, _| ())?;
     Ok(all.into_iter().map(|(demonstration, _)| demonstration).collect())
 }
 
@@ -94,7 +92,7 @@ pub fn demonstrate(tutoring: &Tutoring, seed: u64, threads: usize) -> Result<Vec
 ///
 /// # Errors
 /// As [`demonstrate`].
-pub fn demonstrate_and_look<T: Send>(
+pub fn demonstrate_with<T: Send>(
     tutoring: &Tutoring,
     seed: u64,
     threads: usize,
@@ -135,8 +133,7 @@ fn demonstration<T>(
     sequence: usize,
     look: &dyn Fn(&Stage, &[f64]) -> T,
 ) -> Result<(Demonstration, Vec<T>)> {
-    let mut random = ChaCha8Rng::seed_from_u64(seed ^ DOMAIN);
-    random.set_stream(sequence as u64);
+    let mut random = stream(seed, Purpose::Tutor, sequence as u64);
     let position = sequence % POSITIONS.len();
     let y = POSITIONS[position] + random.random_range(-1.0..1.0) * tutoring.placement;
     let path = Path::draw(robot, y, tutoring.samples, &mut random)?;
@@ -146,7 +143,7 @@ fn demonstration<T>(
         stage.world.set_servo(stage.robot(), joint, Servo { stiffness: 60.0, damping: 2.5 });
     }
     let steps = samples_to_steps(&tutoring.world)?;
-    let mut watch = Watch::default();
+    let mut detector = TouchDetector::default();
     let mut samples = Vec::with_capacity(tutoring.samples * REACHING.len());
     let mut seen = Vec::with_capacity(tutoring.samples);
     for sample in 0..tutoring.samples {
@@ -157,10 +154,10 @@ fn demonstration<T>(
         samples.extend(sensed);
         for step in 1..=steps {
             stage.step(&path.at((sample as f64 + step as f64 / steps as f64) * PERIOD));
-            watch.observe(stage.moment());
+            detector.observe(stage.hand_state());
         }
     }
-    Ok((Demonstration { position, y, samples, cycles: watch.finish() }, seen))
+    Ok((Demonstration { position, y, samples, cycles: detector.finish() }, seen))
 }
 
 fn normal(random: &mut impl Rng) -> f64 {

@@ -1,11 +1,11 @@
-//! What happened in a simulation, moment by moment, as an MCAP file that Foxglove and rerun open.
+//! What happened in a simulation, as an MCAP file that Foxglove and rerun open.
 //!
 //! | topic | what it holds | encoding |
 //! |---|---|---|
 //! | `/scene` | `foxglove.SceneUpdate`: each body as an entity | protobuf |
 //! | `/transforms` | `foxglove.FrameTransforms`: each frame in the link that it hangs on | protobuf |
 //! | `/joint_states`, `/joint_targets` | `foxglove.JointStates` | JSON |
-//! | `/sensed` | by channel, in the data's units: what the network is told | JSON |
+//! | `/sensed` | by channel, in the data's units: what the network senses | JSON |
 //! | `/predicted_mean`, `/predicted_variance` | by channel: what it expects next, and how far off it expects to be | JSON |
 //! | `/contacts` | pairs of bodies, with distance and force | JSON |
 //! | `/events` | whatever else happened, by name | JSON |
@@ -42,12 +42,15 @@ use mcap::records::MessageHeader;
 use mcap::{Attachment, McapError};
 use serde::Serialize;
 
+use crate::world::JointState;
 use crate::world::scene::Scene;
 use json::{Named, Time};
 
 mod error;
 mod foxglove;
 mod json;
+#[cfg(test)]
+pub(crate) mod reading;
 mod types;
 mod wire;
 
@@ -95,6 +98,12 @@ impl<'a> Joint<'a> {
     #[must_use]
     pub fn at(name: &'a str, position: f64) -> Self {
         Self { name, position, velocity: None, effort: None }
+    }
+}
+
+impl<'a> From<JointState<'a>> for Joint<'a> {
+    fn from(JointState { name, angle, velocity }: JointState<'a>) -> Self {
+        Self { name, position: angle, velocity: Some(velocity), effort: None }
     }
 }
 
@@ -217,7 +226,8 @@ impl<W: Write + Seek> Recorder<W> {
         self.write("/scene", time, &foxglove::scene_update(time, scene))
     }
 
-    /// Where the joints are.
+    /// Where the joints are. Readers place a robot's links by them and its description, so none should be left out, even
+    /// those that the experiment does not move.
     ///
     /// # Errors
     /// [`RecordingError::NotFinite`], [`RecordingError::Twice`].
@@ -233,7 +243,7 @@ impl<W: Write + Seek> Recorder<W> {
         self.joints("/joint_targets", time, joints)
     }
 
-    /// What the network is told, a value for each channel in the data's units.
+    /// What the network senses, a value for each channel in the data's units.
     ///
     /// # Errors
     /// [`RecordingError::NotFinite`], [`RecordingError::Length`].
