@@ -22,6 +22,10 @@ pub mod world;
 
 mod streams;
 
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 // The paths before the modules had folders, for callers that still use them.
 #[doc(hidden)]
 pub use interact::{self as film, self as follower, self as interaction};
