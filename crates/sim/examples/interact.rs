@@ -15,12 +15,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut interaction = Interaction::new(&order, &InteractionOptions::default(), 1)?;
     let mut film = Film::new(&[("example", "interact")])?;
     film.begin("LR")?;
-    println!("seconds {}", CHANNELS.map(|name| format!("{name:>14}")).concat());
+    println!("seconds {}", CHANNELS.map(|name| format!("{name:>15}")).concat());
     for sample in 0..interaction.samples() {
         let sensed = interaction.sense();
         film.frame(&interaction, &sensed, None)?;
         if sample % 10 == 0 {
-            println!("{:>7.1} {}", sample as f64 * PERIOD, sensed.map(|value| format!("{value:>14.3}")).concat());
+            println!("{:>7.1} {}", sample as f64 * PERIOD, sensed.map(|value| format!("{value:>15.3}")).concat());
         }
         interaction.step_tutored();
         if let Some(collision) = interaction.collision() {

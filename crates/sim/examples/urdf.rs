@@ -9,7 +9,7 @@
 use std::error::Error;
 
 use nalgebra::Isometry3;
-use scrnn_sim::robot::{Robot, nao};
+use scrnn_sim::robot::{Limits, Robot, nao};
 use scrnn_sim::world::scene::Part;
 use scrnn_sim::world::{Placement, World, WorldOptions};
 
@@ -20,10 +20,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     println!("{}: {} links, {} movable joints", robot.name, robot.links().len(), robot.dof());
 
-    // All joints at 0, or as near as their limits let them; then a tenth of their range further.
+    // All joints at 0, or as near as their limits let them; then a tenth of their range further, to the side with more room.
     let start: Vec<f64> = robot.movable().map(|(_, limits)| 0.0_f64.clamp(limits.lower, limits.upper)).collect();
-    let range = |limits: scrnn_sim::robot::Limits| (limits.upper - limits.lower).min(std::f64::consts::TAU);
-    let goals: Vec<f64> = robot.movable().zip(&start).map(|((_, limits), q)| q + 0.1 * range(limits)).collect();
+    let further = |Limits { lower, upper, .. }: Limits, q: f64| {
+        let step = 0.1 * (upper - lower).min(std::f64::consts::TAU);
+        if upper - q >= q - lower { q + step } else { q - step }
+    };
+    let goals: Vec<f64> = robot.movable().zip(&start).map(|((_, limits), &q)| further(limits, q)).collect();
 
     let mut world = World::new(WorldOptions::default())?;
     let world_from_root = Isometry3::identity();
