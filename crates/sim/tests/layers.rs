@@ -10,7 +10,7 @@ const MAY_USE: [(&str, &[&str]); 8] = [
     ("parallel.rs", &[]),
     ("robot", &["error"]),
     ("world", &["error", "robot"]),
-    ("recording", &["world", "robot"]),
+    ("recording", &["error", "robot", "world"]),
     ("reach", &["error", "streams", "parallel", "robot", "world", "recording"]),
     ("interact", &["error", "streams", "robot", "world", "recording"]),
 ];
