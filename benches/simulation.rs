@@ -15,10 +15,10 @@ use scrnn::engine::InstructionSet;
 use scrnn::initialization::initialize;
 use scrnn::scaling::Scaling;
 use scrnn::topology::Topology;
-use scrnn_sim::agent::{NetworkDriver, Noise, Performance, Replay, perform_unseen};
-use scrnn_sim::nao;
-use scrnn_sim::reaching::{CYCLE, PERIOD, POSITIONS, retracted_arm, touching_arm};
-use scrnn_sim::tutor::{Tutoring, demonstrate};
+use scrnn_sim::reach::agent::{NetworkDriver, Noise, Performance, Replay, perform_unobserved};
+use scrnn_sim::reach::stage::{CYCLE, PERIOD, POSITIONS, retracted_arm, touching_arm};
+use scrnn_sim::reach::tutor::{Tutoring, demonstrate};
+use scrnn_sim::robot::nao;
 use scrnn_sim::world::WorldOptions;
 
 fn performance() -> Performance {
@@ -39,7 +39,7 @@ fn simulation(criterion: &mut Criterion) {
             let set = InstructionSet::best();
             let driver = NetworkDriver::new(&network, states.mean(), &scaling, &Noise::Predicted, 1, set);
             let mut driver = driver.expect("a network on six channels");
-            black_box(perform_unseen(&performance(), &mut driver).expect("a stage with a robot"))
+            black_box(perform_unobserved(&performance(), &mut driver).expect("a stage with a robot"))
         });
     });
 
@@ -52,7 +52,7 @@ fn simulation(criterion: &mut Criterion) {
         bencher.iter(|| {
             let arms = [[far; CYCLE / 2], [near; CYCLE / 2]].concat();
             let mut driver = Replay::new(arms).expect("twelve arms");
-            let performed = perform_unseen(&performance(), &mut driver).expect("a stage with a robot");
+            let performed = perform_unobserved(&performance(), &mut driver).expect("a stage with a robot");
             assert!(performed.cycles.iter().any(|cycle| cycle.touched));
             black_box(performed)
         });

@@ -2,7 +2,8 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Does the pieces 0 to `count` on `threads` threads, and gives their results in order, or the first failure in order.
+/// Does the pieces 0 to `count` on `threads` threads, and gives their results in order, or the failure of the first piece
+/// that failed. Pieces after one that has failed are not begun, so that work can be ended from within.
 ///
 /// # Errors
 /// The work's own.
@@ -11,25 +12,38 @@ pub fn in_parallel<T: Send, E: Send>(
     threads: usize,
     work: impl Fn(usize) -> Result<T, E> + Sync,
 ) -> Result<Vec<T>, E> {
-    let next = AtomicUsize::new(0);
-    let take = || {
-        let mut done = Vec::new();
-        loop {
-            let piece = next.fetch_add(1, Ordering::Relaxed);
-            if piece >= count {
-                return done;
+    let failed = AtomicUsize::new(usize::MAX);
+    let mut pieces: Vec<(usize, Option<Result<T, E>>)> = (0..count).map(|piece| (piece, None)).collect();
+    for_each(threads, &mut pieces, |(piece, result)| {
+        // All pieces before the first failure are done in any case: which failure is given does not depend on threads.
+        if *piece < failed.load(Ordering::Relaxed) {
+            let done = work(*piece);
+            if done.is_err() {
+                failed.fetch_min(*piece, Ordering::Relaxed);
             }
-            done.push((piece, work(piece)));
+            *result = Some(done);
         }
-    };
-    let mut all: Vec<(usize, Result<T, E>)> = std::thread::scope(|scope| {
-        let running: Vec<_> = (0..threads.clamp(1, count.max(1))).map(|_| scope.spawn(take)).collect();
-        let finished =
-            running.into_iter().map(|one| one.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
-        finished.flatten().collect()
     });
-    all.sort_by_key(|(piece, _)| *piece);
-    all.into_iter().map(|(_, result)| result).collect()
+    pieces.into_iter().filter_map(|(_, result)| result).collect()
+}
+
+/// Calls `work` on every item. This is the one place that starts threads here.
+fn for_each<T: Send>(threads: usize, items: &mut [T], work: impl Fn(&mut T) + Sync) {
+    let threads = threads.min(items.len());
+    if threads <= 1 {
+        return items.iter_mut().for_each(work);
+    }
+    let waiting = std::sync::Mutex::new(items.iter_mut());
+    let next = || waiting.lock().unwrap_or_else(std::sync::PoisonError::into_inner).next();
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| {
+                while let Some(item) = next() {
+                    work(item);
+                }
+            });
+        }
+    });
 }
 
 #[cfg(test)]
@@ -42,5 +56,16 @@ mod tests {
         assert_eq!(squares, (0..20).map(|piece| piece * piece).collect::<Vec<_>>());
         assert_eq!(in_parallel(20, 4, |piece| if piece % 7 == 5 { Err(piece) } else { Ok(()) }), Err(5));
         assert_eq!(in_parallel(0, 4, |_| Ok::<(), ()>(())), Ok(Vec::new()));
+    }
+
+    #[test]
+    fn a_failure_keeps_later_pieces_from_being_begun() {
+        let begun = AtomicUsize::new(0);
+        let work = |piece| {
+            begun.fetch_add(1, Ordering::Relaxed);
+            if piece == 1 { Err(piece) } else { Ok(()) }
+        };
+        assert_eq!(in_parallel(1000, 1, work), Err(1));
+        assert_eq!(begun.load(Ordering::Relaxed), 2);
     }
 }
