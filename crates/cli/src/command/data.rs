@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use scrnn_run::source;
 use scrnn_sim::reaching::PERIOD;
-use scrnn_sim::reaching_recording::{Look, ReachingRecording};
+use scrnn_sim::reaching_recording::{DemonstrationSample, ReachingRecording};
 use scrnn_sim::tutor::{self, Demonstration};
 use scrnn_tasks::{Task, TaskName, interact, make};
 
@@ -96,7 +96,7 @@ fn reach(arguments: &Arguments, size: (usize, usize), shared: &Shared) -> Result
     let tutoring = source::tutoring(size, arguments.exact_positions);
     let threads = shared.engine()?.threads();
     if let Some(path) = arguments.out.as_deref().filter(|path| is_recording(path)) {
-        let all = tutor::demonstrate_and_look(&tutoring, arguments.seed, threads, &Look::at)?;
+        let all = tutor::demonstrate_with(&tutoring, arguments.seed, threads, &DemonstrationSample::at)?;
         let seed = arguments.seed.to_string();
         files::replace(path, &recording(&all, &seed)?)?;
         return Ok(Ending::Done);
@@ -111,7 +111,7 @@ fn reach(arguments: &Arguments, size: (usize, usize), shared: &Shared) -> Result
 }
 
 /// All demonstrations one after the other, a second apart.
-fn recording(all: &[(Demonstration, Vec<Look>)], seed: &str) -> Result<Vec<u8>> {
+fn recording(all: &[(Demonstration, Vec<DemonstrationSample>)], seed: &str) -> Result<Vec<u8>> {
     let names = tutor::dataset(&all.iter().map(|(one, _)| one.clone()).collect::<Vec<_>>())?;
     let notes = [("task", "reach"), ("seed", seed)];
     let mut recording = ReachingRecording::new(Cursor::new(Vec::new()), None, &notes)?;
@@ -119,7 +119,7 @@ fn recording(all: &[(Demonstration, Vec<Look>)], seed: &str) -> Result<Vec<u8>> 
     for ((_, looks), sequence) in all.iter().zip(names.sequences()) {
         recording.begin_sequence(begin, &sequence.name)?;
         for look in looks {
-            recording.look(look)?;
+            recording.demonstration(look)?;
         }
         begin += looks.len() as f64 * PERIOD + 1.0;
     }

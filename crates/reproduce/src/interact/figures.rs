@@ -193,17 +193,17 @@ pub fn on_its_own(materials: &[Material]) -> Figure {
 /// The panels of one interaction in the world.
 fn world_panels(title: &str, material: &Material, followed: &Followed) -> Vec<Panel> {
     let (until, n) = (samples(), 8);
-    let predicted: Vec<f64> = followed.moments.iter().filter_map(|moment| moment.predicted).flatten().collect();
-    let variance: Vec<f64> = followed.moments.iter().flat_map(|moment| moment.variance.iter().copied()).collect();
+    let predicted: Vec<f64> = followed.steps.iter().filter_map(|moment| moment.predicted).flatten().collect();
+    let variance: Vec<f64> = followed.steps.iter().flat_map(|moment| moment.variance.iter().copied()).collect();
     let error: Vec<(f64, f64)> =
-        followed.moments.iter().enumerate().map(|(k, moment)| ((k + 1) as f64, moment.error)).collect();
-    let hand: Vec<(f64, f64)> =
-        followed.moments.iter().enumerate().map(|(k, moment)| (k as f64, moment.hand)).collect();
-    let context: Vec<f64> = followed.moments.iter().flat_map(|moment| moment.context.iter().copied()).collect();
-    let units = followed.moments.first().map_or(1, |moment| moment.context.len());
+        followed.steps.iter().enumerate().map(|(k, moment)| ((k + 1) as f64, moment.error)).collect();
+    let hand: Vec<(f64, f64)> = followed.steps.iter().enumerate().map(|(k, moment)| (k as f64, moment.hand)).collect();
+    let context: Vec<f64> = followed.steps.iter().flat_map(|moment| moment.context.iter().copied()).collect();
+    let units = followed.steps.first().map_or(1, |moment| moment.context.len());
     let mut hands = vec![Series::line("", Tone::Ours, hand)];
-    let hits = |(k, moment): (usize, &scrnn_sim::follower::Moment)| moment.collision.map(|_| (k as f64, moment.hand));
-    let hits: Vec<(f64, f64)> = followed.moments.iter().enumerate().filter_map(hits).collect();
+    let hits =
+        |(k, moment): (usize, &scrnn_sim::follower::ControlStep)| moment.collision.map(|_| (k as f64, moment.hand));
+    let hits: Vec<(f64, f64)> = followed.steps.iter().enumerate().filter_map(hits).collect();
     if !hits.is_empty() {
         hands.push(Series::dots("collision", Tone::Failed, hits));
     }
@@ -302,7 +302,7 @@ pub fn window(materials: &[Material]) -> Option<Figure> {
             }
             all
         };
-        let sensed = |sample: usize| followed.moments.get(sample).map(|moment| moment.sensed);
+        let sensed = |sample: usize| followed.steps.get(sample).map(|moment| moment.sensed);
         let panel = |title: String, y: (f64, f64), series: Vec<Series>| {
             let mut all: Vec<Series> = [tail, head]
                 .map(|at| Series::line("", Tone::Grid, vec![(at as f64 - 0.5, y.0), (at as f64 - 0.5, y.1)]))

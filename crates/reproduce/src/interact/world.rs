@@ -2,7 +2,7 @@
 //! figures are drawn from.
 
 use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions};
-use scrnn_sim::follower::{Branch, Followed, Mind, Outcome, follow, with_own_arm};
+use scrnn_sim::follower::{Branch, ControlStep, Controller, Followed, Outcome, follow, with_own_arm};
 use scrnn_sim::interaction::{Interaction, InteractionOptions, parse_order, random_order};
 use serde::Serialize;
 
@@ -55,8 +55,8 @@ pub struct Snapshot {
 }
 
 impl Subject<'_> {
-    fn mind<'a>(&'a self, state: &'a [f64]) -> Mind<'a> {
-        Mind {
+    fn controller<'a>(&'a self, state: &'a [f64]) -> Controller<'a> {
+        Controller {
             network: self.network,
             scaling: self.scaling,
             initial_state: state,
@@ -72,7 +72,10 @@ impl Subject<'_> {
             let order = random_order(BRANCHES, 0.5, trial);
             let mut interaction = Interaction::new(&order, &InteractionOptions::default(), trial)?;
             let observe = |regression: &mut ErrorRegression, sample: &[f64]| regression.observe(sample, &mut || true);
-            branches.extend(follow(&self.mind(state), &options, &mut interaction, observe, |_, _, _| {})?.branches);
+            let unwatched = |_: &Interaction, _: &ControlStep, _: &ErrorRegression| Ok(());
+            let followed: Result<Followed> =
+                follow(&self.controller(state), &options, &mut interaction, observe, unwatched);
+            branches.extend(followed?.branches);
         }
         Ok(InWorld::of(branches))
     }
@@ -84,7 +87,7 @@ impl Subject<'_> {
         let mut interaction = Interaction::new(&parse_order(SHOWN)?, &InteractionOptions::default(), self.seed)?;
         let observe = |regression: &mut ErrorRegression, sample: &[f64]| regression.observe(sample, &mut || true);
         let mut snapshots = Vec::new();
-        let followed = follow(&self.mind(state), &options, &mut interaction, observe, |_, _, regression| {
+        let followed = follow(&self.controller(state), &options, &mut interaction, observe, |_, _, regression| {
             let window = regression.window();
             let past = 0..window;
             let mut means: Vec<Vec<f64>> = past.clone().map(|k| regression.postdicted_mean(k).to_vec()).collect();
@@ -92,6 +95,7 @@ impl Subject<'_> {
             means.extend((0..=AHEAD).map(|k| regression.foreseen_mean(k).to_vec()));
             contexts.extend((0..=AHEAD).map(|k| regression.foreseen_context(k).to_vec()));
             snapshots.push(Snapshot { window, means, contexts, tail: regression.tail().to_vec() });
+            Result::Ok(())
         })?;
         Ok((followed, snapshots))
     }

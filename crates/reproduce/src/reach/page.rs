@@ -4,7 +4,7 @@ use scrnn_sim::agent::Decision;
 use scrnn_sim::channels::{REACHING, VISION};
 use scrnn_sim::reaching::{CYCLE, PERIOD, POSITIONS};
 use scrnn_sim::scene::Scene;
-use scrnn_sim::touching::{Cycle, Moment};
+use scrnn_sim::touching::{Cycle, HandState};
 use scrnn_sim::tutor::Demonstration;
 
 use super::trials::{Found, Given, decided};
@@ -105,7 +105,7 @@ fn over_time(material: &Material) -> Block {
 }
 
 /// The picture that was taken next to a moment.
-fn picture(given: &Given, moment: Option<Moment>) -> Option<Scene> {
+fn picture(given: &Given, moment: Option<HandState>) -> Option<Scene> {
     let time = moment?.time;
     let off = |picture: &&(f64, Scene)| (picture.0 - time).abs();
     given.pictures.iter().min_by(|a, b| off(a).total_cmp(&off(b))).map(|(_, scene)| scene.clone())
@@ -113,7 +113,7 @@ fn picture(given: &Given, moment: Option<Moment>) -> Option<Scene> {
 
 /// Fig. 4.5.
 fn snapshots(material: &Material) -> Block {
-    let row = |what: &str, moment: fn(&Cycle) -> Option<Moment>| -> Vec<Picture> {
+    let row = |what: &str, moment: fn(&Cycle) -> Option<HandState>| -> Vec<Picture> {
         at_positions(material)
             .enumerate()
             .filter_map(|(k, given)| {

@@ -3,7 +3,7 @@
 use scrnn::analysis::mixture::{GaussianMixture, MixtureOptions};
 use scrnn::engine::InstructionSet;
 use scrnn_sim::agent::{
-    Decision, Driver, Glimpse, MixtureDriver, NetworkDriver, Noise, Performance, Performed, Replay, perform,
+    Decision, Driver, MixtureDriver, NetworkDriver, Noise, Performance, Performed, Replay, Snapshot, perform,
 };
 use scrnn_sim::channels::{REACHING, VISION};
 use scrnn_sim::parallel::in_parallel;
@@ -125,7 +125,7 @@ impl<'a> Company<'a> {
         let mut driver = self.driver(trial)?;
         let mut pictures = Vec::new();
         let clock = ProcessorTime::start();
-        let mut look = |glimpse: &Glimpse<'_>| -> Result<()> {
+        let mut look = |glimpse: &Snapshot<'_>| -> Result<()> {
             let time = glimpse.stage.world.time();
             if trial.pictures && glimpse.decision.is_none() && time + 1e-9 > 0.1 * (pictures.len() + 1) as f64 {
                 pictures.push((time, glimpse.stage.world.scene()));

@@ -151,12 +151,12 @@ fn rank_correlation(a: &[f64], b: &[f64]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use scrnn_sim::touching::Moment;
+    use scrnn_sim::touching::HandState;
 
     #[test]
     fn phases_count_from_the_nearest_touch() {
         let cycle = |time| {
-            let touch = Moment { time, gap: 0.0, aim: 0.0, hand: [0.0; 3] };
+            let touch = HandState { time, gap: 0.0, aim: 0.0, hand: [0.0; 3] };
             Cycle { touch, touched: true, retraction: None, retracted: false }
         };
         let cycles = [cycle(3.0), cycle(9.1)];

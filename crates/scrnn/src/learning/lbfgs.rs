@@ -365,8 +365,7 @@ mod tests {
             let start = -40.7 * f64::from(place);
             network.parameters.block_mut(Block::VarianceBias).fill(start);
             states.mean_mut().fill(0.0);
-            let items = [Item { samples: &samples, steps: 8 }];
-            let mut batches = Batches::new(&topology, &items, 1, false, &Engine::serial());
+            let mut batches = batches(&topology, std::slice::from_ref(&samples));
             let mut rule = LbfgsRule::new(&Lbfgs::default(), &topology, 1, 8.0, 1.0);
             batches.evaluate(&network.parameters, &states);
             let before = batches.ln_likelihood();

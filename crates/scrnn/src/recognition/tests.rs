@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::dataset::Sequence;
+use crate::engine::Engine;
 use crate::generation::{Feedback, GenerationOptions, Start, generate};
 use crate::initialization::initialize;
 use crate::topology::{Group, Prediction, Topology};

@@ -6,7 +6,7 @@ use clap::Args;
 use scrnn::analysis::excursions::Side;
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions};
-use scrnn_sim::follower::{Branch, Followed, Mind, Outcome, follow, with_own_arm};
+use scrnn_sim::follower::{Branch, ControlStep, Controller, Followed, Outcome, follow, with_own_arm};
 use scrnn_sim::interaction::{CHANNELS, Interaction, InteractionOptions, letters, parse_order, random_order};
 use serde::Serialize;
 use serde_json::json;
@@ -101,7 +101,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
             None => random_order(BRANCHES, 0.5, seed),
         };
         let (initial_state, state) = arguments.start(&trained, &order)?;
-        let mind = Mind {
+        let controller = Controller {
             network: &network,
             scaling: &checkpoint.scaling,
             initial_state: state,
@@ -112,23 +112,20 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         if let Some(film) = &mut film {
             film.begin(&letters(&order))?;
         }
-        let mut failed = None;
         let observe = |regression: &mut ErrorRegression, sample: &[f64]| {
             deadline.sample(|go_on| regression.observe(sample, go_on))
         };
-        let followed = follow(&mind, &options, &mut interaction, observe, |interaction, moment, _| {
-            let Some(film) = film.as_mut().filter(|_| failed.is_none()) else { return };
+        let watch = |interaction: &Interaction, step: &ControlStep, _: &ErrorRegression| -> Result<()> {
+            let Some(film) = film.as_mut() else { return Ok(()) };
             let scaling = &checkpoint.scaling;
             let raw = |y: [f64; 8]| (0..8).map(|i| scaling.to_raw(i, y[i])).collect::<Vec<_>>();
-            let mean = moment.predicted.map(raw);
+            let mean = step.predicted.map(raw);
             let variance: Vec<f64> =
-                moment.variance.iter().enumerate().map(|(i, &v)| scaling.variance_to_raw(i, v)).collect();
+                step.variance.iter().enumerate().map(|(i, &v)| scaling.variance_to_raw(i, v)).collect();
             let variance = Some(variance.as_slice()).filter(|variance| !variance.is_empty());
-            failed = film.frame(interaction, &moment.sensed, mean.as_deref().map(|mean| (mean, variance))).err();
-        })?;
-        if let Some(failure) = failed {
-            return Err(failure.into());
-        }
+            Ok(film.frame(interaction, &step.sensed, mean.as_deref().map(|mean| (mean, variance)))?)
+        };
+        let followed = follow(&controller, &options, &mut interaction, observe, watch)?;
         let (order, branches) = (letters(&order), followed.branches.clone());
         trials.push(Trial { order, initial_state, branches, latency: deadline.latency(), followed });
     }
@@ -217,8 +214,8 @@ fn told(trials: &[Trial]) -> String {
 fn write(path: &std::path::Path, trained: &Trained, trials: &[Trial]) -> Result<()> {
     let (checkpoint, n) = (&trained.checkpoint, CHANNELS.len());
     let (scaling, delay) = (&checkpoint.scaling, checkpoint.topology.delay());
-    let moments = |trial: &Trial| trial.followed.moments.get(delay..).unwrap_or_default().to_vec();
-    let field = |names: Vec<String>, of: &dyn Fn(&scrnn_sim::follower::Moment) -> Vec<f64>| -> Result<Dataset> {
+    let moments = |trial: &Trial| trial.followed.steps.get(delay..).unwrap_or_default().to_vec();
+    let field = |names: Vec<String>, of: &dyn Fn(&scrnn_sim::follower::ControlStep) -> Vec<f64>| -> Result<Dataset> {
         let rows = trials
             .iter()
             .map(|trial| Sequence::new(trial.order.clone(), names.len(), moments(trial).iter().flat_map(of).collect()));

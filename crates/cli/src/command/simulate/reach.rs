@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::Args;
-use scrnn_sim::agent::{Glimpse, NetworkDriver, Noise, Performance, perform};
+use scrnn_sim::agent::{NetworkDriver, Noise, Performance, Snapshot, perform};
 use scrnn_sim::channels::REACHING;
 use scrnn_sim::reaching::{CYCLE, POSITIONS};
 use scrnn_sim::reaching_recording::ReachingRecording;
@@ -140,9 +140,9 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         Some(_) => Some(recording(&trained, arguments)?),
         None => None,
     };
-    let mut look = |glimpse: &Glimpse<'_>| -> Result<()> {
+    let mut look = |snapshot: &Snapshot<'_>| -> Result<()> {
         match &mut recording {
-            Some(recording) => Ok(recording.glimpse(glimpse)?),
+            Some(recording) => Ok(recording.snapshot(snapshot)?),
             None => Ok(()),
         }
     };
