@@ -309,6 +309,21 @@ fn one_file_of_the_library_names_rayon() {
     assert_eq!(files, ["crates/scrnn/src/engine.rs"]);
 }
 
+/// Crates whose random numbers all come from `scrnn::streams`. What stands in a file's tests may draw as it likes.
+const FROM_STREAMS: [&str; 2] = ["crates/scrnn/src/", "crates/tasks/src/"];
+
+#[test]
+fn one_file_makes_generators_of_random_numbers() {
+    let makes = |source: &&Text| {
+        let code = source.text.split("#[cfg(test)]").next().unwrap_or_default();
+        let own = FROM_STREAMS.iter().any(|folder| source.path.starts_with(folder)) && !source.is_test();
+        own && ["seed_from_u64(", "from_seed(", "set_stream(", "from_rng("].iter().any(|call| code.contains(call))
+    };
+    let sources = sources();
+    let files: Vec<&str> = sources.iter().filter(makes).map(|source| source.path.as_str()).collect();
+    assert_eq!(files, ["crates/scrnn/src/streams.rs"]);
+}
+
 #[test]
 fn nothing_is_left_undone() {
     let mut problems = Vec::new();
