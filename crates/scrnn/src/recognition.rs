@@ -177,7 +177,8 @@ pub fn recognize(
     objective.set_parameters(&network.parameters);
     let objective = objective.as_mut();
     let mut results: Vec<Recognition> = Vec::with_capacity(data.sequences().len());
-    let mut waiting: Vec<Origin> = Vec::new();
+    let places = Places::new(learned, &problem.learns, options.random_spread);
+    let (mut waiting, width) = (Vec::new(), problem.columns_at_a_time());
     for (s, mut ranking) in problem.rank(learned, objective).into_iter().enumerate() {
         let starts = starts(options, &ranking);
         ranking.truncate(options.ranked);
@@ -185,9 +186,8 @@ pub fn recognize(
         results.push(Recognition { trials: Vec::with_capacity(starts.len()), ranking, polish: Polish::default() });
         let mut random = stream(options.seed, Purpose::RecognitionStarts, s as u64);
         for start in starts {
-            let state = initial_state(network, learned, start, options.random_spread, &mut random);
-            waiting.push(Origin { sequence: s, start, state });
-            if waiting.len() == problem.columns_at_a_time() {
+            waiting.push(Origin { sequence: s, start, state: places.state(start, &mut random) });
+            if waiting.len() == width {
                 ascent::ascend(&problem, objective, &mut waiting, &mut results);
             }
         }
@@ -216,6 +216,9 @@ fn check(network: &Network, learned: &InitialStates, data: &Dataset, options: &R
     }
     if options.warm_starts.is_empty() {
         return setting("the list of starts", "empty".to_owned(), "at least one kind");
+    }
+    if learned.sequences() == 0 && options.warm_starts.iter().all(|kind| *kind == WarmStart::Learned) {
+        return setting("the list of starts", "learned states, of which there are none".to_owned(), "another kind");
     }
     if !(0.0..1.0).contains(&options.beta2) {
         return setting("beta2", options.beta2.to_string(), "a number from 0 to below 1");
@@ -274,8 +277,8 @@ impl Problem<'_> {
         let longest = (0..self.data.sequences().len()).map(|s| self.steps(s)).max().unwrap_or(0);
         let topology = &self.network.topology;
         let samples = (longest + topology.delay()) * topology.channels();
-        // States, gradients and moments, and what a block holds for each column.
-        let own = 8 * (topology.context_units() + topology.channels());
+        // States, gradients and moments, the pairs of the polish, and what a block holds for each column.
+        let own = (8 + 2 * polish::MEMORY) * (topology.context_units() + topology.channels());
         (AT_A_TIME / ((samples + own) * size_of::<f64>())).max(BLOCK)
     }
 
@@ -365,32 +368,42 @@ fn starts(options: &RecognitionOptions, ranking: &[Ranked]) -> Vec<TrialStart> {
     starts
 }
 
-fn initial_state(
-    network: &Network,
-    learned: &InitialStates,
-    start: TrialStart,
-    spread: f64,
-    random: &mut ChaCha8Rng,
-) -> Vec<f64> {
-    let learns: Vec<bool> = network.topology.per_unit(|group| group.learns_initial_state).collect();
-    let n = learned.sequences().max(1) as f64;
-    let of = |i: usize| (0..learned.sequences()).map(move |s| learned.sequence(s)[i]);
-    let draw = |i: usize, random: &mut ChaCha8Rng| {
-        let mean = of(i).sum::<f64>() / n;
-        let variance = of(i).map(|u| (u - mean).powi(2)).sum::<f64>() / n;
-        // Even where nothing was learned, starts must differ.
-        let z: f64 = StandardNormal.sample(random);
-        mean + (spread * variance.sqrt()).max(1e-3) * z
-    };
-    (0..learns.len())
-        .map(|i| match start {
-            _ if !learns[i] => 0.0,
+/// Where starts lie.
+struct Places<'a> {
+    learned: &'a InitialStates,
+    learns: &'a [bool],
+    /// Mean and standard deviation of the random starts in each unit.
+    normal: Vec<(f64, f64)>,
+}
+
+impl<'a> Places<'a> {
+    fn new(learned: &'a InitialStates, learns: &'a [bool], spread: f64) -> Self {
+        let n = learned.sequences().max(1) as f64;
+        let normal = |i: usize| {
+            let of = || (0..learned.sequences()).map(|s| learned.sequence(s)[i]);
+            let mean = of().sum::<f64>() / n;
+            let variance = of().map(|u| (u - mean).powi(2)).sum::<f64>() / n;
+            // Even where nothing was learned, starts must differ.
+            (mean, (spread * variance.sqrt()).max(1e-3))
+        };
+        Self { learned, learns, normal: (0..learns.len()).map(normal).collect() }
+    }
+
+    /// u_0 of a start.
+    fn state(&self, start: TrialStart, random: &mut ChaCha8Rng) -> Vec<f64> {
+        let draw = |i: usize, random: &mut ChaCha8Rng| {
+            let z: f64 = StandardNormal.sample(random);
+            self.normal[i].0 + self.normal[i].1 * z
+        };
+        let unit = |i: usize| match start {
+            _ if !self.learns[i] => 0.0,
             TrialStart::Zero => 0.0,
-            TrialStart::Mean => learned.mean()[i],
-            TrialStart::Learned(s) => learned.sequence(s)[i],
+            TrialStart::Mean => self.learned.mean()[i],
+            TrialStart::Learned(s) => self.learned.sequence(s)[i],
             TrialStart::Random => draw(i, random),
-        })
-        .collect()
+        };
+        (0..self.learns.len()).map(unit).collect()
+    }
 }
 
 #[cfg(test)]

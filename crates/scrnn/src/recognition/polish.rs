@@ -10,7 +10,7 @@ use crate::objective::{Evaluation, Objective, Want};
 use crate::quasi_newton::{Next, Pairs, Search, dot};
 
 /// Updates that are remembered.
-const MEMORY: usize = 20;
+pub(super) const MEMORY: usize = 20;
 /// Updates whose gain says whether anything is left: a single one may be short by chance.
 const WINDOW: usize = 10;
 

@@ -126,6 +126,14 @@ fn senseless_requests_are_refused() {
     assert!(refuse(RecognitionOptions { starts: 0, ..options() }).contains("starts is 0"));
     assert!(refuse(RecognitionOptions { random_spread: 0.0, ..options() }).contains("random_spread is 0"));
     assert!(refuse(RecognitionOptions { beta2: 1.0, ..options() }).contains("beta2 is 1"));
+    assert!(refuse(RecognitionOptions { tolerance: -1.0, ..options() }).contains("tolerance is -1"));
+    let other = initialize(&Topology::s_ctrnn(2, 5, 2.0).unwrap(), 1, 1).1;
+    let told = recognize(&network, &other, &data, &options(), &Engine::serial()).unwrap_err().to_string();
+    assert!(told.contains("the mean of the learned initial states holds 5 values; needed: 12"), "{told}");
+    let none = InitialStates::zeros(&network.topology, 0);
+    let learned = RecognitionOptions { warm_starts: vec![WarmStart::Learned], ..options() };
+    let told = recognize(&network, &none, &data, &learned, &Engine::serial()).unwrap_err().to_string();
+    assert!(told.contains("learned states, of which there are none"), "{told}");
 }
 
 /// ln L_all of `state` on sequence `s`, found by the ranking's way.
