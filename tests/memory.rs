@@ -52,12 +52,12 @@ fn formula(topology: &Topology, sequences: usize, steps: usize, batches: usize, 
     let gradient = 8 * (c + i + 1) * rows;
     let parameters = 8 * (c * (c + i + n_out + 1) + n_out);
     let weights = 8 * (rows * (c + i) + up(c) * (c + n_out));
-    let each_sequence = 8 * c * 2 * 5 + 64;
+    let each_sequence = 8 * c * 2 * 5 + 160;
     let each_of_a_batch = 8 * c * 3 + 8 * i * 4;
     records * record
         + (blocks + 1) * gradient
         + weights
-        + 11 * parameters
+        + 8 * parameters
         + sequences * each_sequence
         + batch * each_of_a_batch
 }
@@ -73,8 +73,8 @@ fn a_training_takes_the_bytes_that_are_promised_whatever_the_number_of_batches()
         for batches in [1, 10, 500] {
             let options = Adam { batch_size: sequences / batches, ..Adam::default() };
             let plan = Plan { epochs: 10, optimiser: Optimiser::Adam(options), ..Plan::default() };
-            let (network, states) = initialize(&topology, sequences, 1);
             let region = Region::new(ALLOCATOR);
+            let (network, states) = initialize(&topology, sequences, 1);
             let mut learner = Learner::new(network, states, &data, plan, &engine).unwrap();
             let _ = learner.run(&mut until(2));
             let taken = region.change();

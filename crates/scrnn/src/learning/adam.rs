@@ -6,7 +6,8 @@
 //! ```
 //!
 //! before which weights w <- (1 - rate(n) decay) w if decay is above 0 (decoupled weight decay, Loshchilov and Hutter 2019).
-//! Initial states move in [`Coordinates`] that are not stiff, however narrow the prior.
+//! Initial states move in [`Coordinates`] that are not stiff, however narrow the prior. Between the first update of an epoch and
+//! the last, z is what is kept, and u_0 follows it and the mean where a batch asks for it: so an update costs what its batch costs.
 
 use std::ops::Range;
 
@@ -133,7 +134,26 @@ impl AdamRule {
         (rate, rate * self.options.initial_state_factor)
     }
 
-    /// One update from the gradients of ln L_out over a batch of sequences. Initial states of others stay as they are.
+    /// Takes z up, before the first update of an epoch.
+    pub fn begin_epoch(&mut self, states: &InitialStates) {
+        self.coordinates.read(states, &mut self.z);
+    }
+
+    /// Brings u_0 of a batch to where z and the mean are.
+    pub fn place(&self, runs: &[Run], states: &mut InitialStates) {
+        let units = states.mean().len();
+        for run in runs {
+            let z = &self.z[run.sequence * units..(run.sequence + 1) * units];
+            self.coordinates.write_one(z, run.sequence, states);
+        }
+    }
+
+    /// Brings u_0 of all sequences there, after the last update of an epoch.
+    pub fn end_epoch(&self, states: &mut InitialStates) {
+        self.coordinates.write(&self.z, states);
+    }
+
+    /// One update of weights, mean, and z of a batch, from the gradients of ln L_out over its sequences.
     pub fn ascend(
         &mut self,
         batch: &Batch<'_>,
@@ -162,7 +182,6 @@ impl AdamRule {
         let units = states.mean().len();
         // Each sequence is met once an epoch.
         let (met, own_rate) = (batch.epoch + 1, rate * adam.initial_state_factor);
-        self.coordinates.read(states, &mut self.z);
         for (run, initial) in batch.runs.iter().zip(initial.chunks_exact(units)) {
             let own = run.sequence * units..(run.sequence + 1) * units;
             let z = &mut self.z[own.clone()];
@@ -178,7 +197,6 @@ impl AdamRule {
             *out = initial.iter().skip(i).step_by(units).sum::<f64>() / batch.terms;
         }
         self.mean.ascend(&adam, batch.update, rate * adam.mean_factor, scratch, states.mean_mut());
-        self.coordinates.write(&self.z, states);
     }
 
     /// Takes over what another rule of the same training remembers; allocates nothing.
@@ -240,7 +258,9 @@ mod tests {
         let (mut evaluation, before) = (Evaluation::new(&topology), states.clone());
         evaluation.initial = vec![1.0, 2.0, -1.0, 5.0];
         let batch = Batch { epoch: 0, update: 1, runs: &[Run::new(2, 10), Run::new(0, 10)], terms: 20.0 };
+        rule.begin_epoch(&states);
         rule.ascend(&batch, &evaluation, &mut network.parameters, &mut states);
+        rule.end_epoch(&mut states);
         let moved = |s: usize| [0, 1].map(|i| states.sequence(s)[i] - before.sequence(s)[i]);
         // The first step of Adam is as long as the rate, three times that of the weights, whatever the gradient.
         for (sequence, expected) in [(0, [-0.3, 0.3]), (1, [0.0, 0.0]), (2, [0.3, 0.3])] {

@@ -170,16 +170,21 @@ impl Batches {
             self.order.sort_unstable();
             self.order.shuffle(&mut stream(0, Purpose::BatchOrder, epoch));
         }
+        rule.begin_epoch(states);
         for nth in 0..count {
             let index = self.order[nth];
-            if count > 1 && !self.evaluate_batch(index, parameters, states) {
-                break;
+            if count > 1 {
+                rule.place(&self.dealt[self.part(index)], states);
+                if !self.evaluate_batch(index, parameters, states) {
+                    break;
+                }
             }
             let runs = &self.dealt[self.part(index)];
             let update = epoch * count as u64 + nth as u64 + 1;
             let batch = adam::Batch { epoch, update, runs, terms: terms(runs, self.channels) };
             rule.ascend(&batch, &self.evaluation, parameters, states);
         }
+        rule.end_epoch(states);
         if count > 1 {
             let runs = &self.dealt[self.part(self.order[count - 1])];
             self.gradient_norm = norm(self.evaluation.gradients.as_slice()) / terms(runs, self.channels);
@@ -326,7 +331,9 @@ mod tests {
             let (mut by_hand, mut own_states) = start.clone();
             let (mut rule, mut met) = (rule(), vec![f64::NAN; 7]);
             let mut single = of(&samples, 2, &topology);
+            rule.begin_epoch(&own_states);
             for (nth, &index) in order.iter().enumerate() {
+                rule.end_epoch(&mut own_states);
                 single.evaluate_batch(index, &by_hand.parameters, &own_states);
                 let runs = &single.dealt[single.part(index)];
                 for run in runs {
@@ -336,6 +343,7 @@ mod tests {
                 let batch = adam::Batch { epoch, update: 4 * epoch + nth as u64 + 1, runs, terms: terms(runs, 1) };
                 rule.ascend(&batch, &single.evaluation, &mut by_hand.parameters, &mut own_states);
             }
+            rule.end_epoch(&mut own_states);
             assert_eq!((&network, &states), (&by_hand, &own_states));
             assert_eq!(batches.ln_likelihoods, met);
             assert_ne!(network, start.0);

@@ -43,13 +43,18 @@ impl Coordinates {
         }
     }
 
-    /// u_0 of all sequences from `z` and the mean that `states` has.
+    /// u_0 of all sequences from `z`, [sequence][unit], and the mean that `states` has.
     pub fn write(&self, z: &[f64], states: &mut InitialStates) {
-        let units = self.learns.len();
-        for (index, z) in z.iter().enumerate() {
-            let i = index % units;
+        for (sequence, z) in z.chunks_exact(self.learns.len()).enumerate() {
+            self.write_one(z, sequence, states);
+        }
+    }
+
+    /// The same for one sequence, from its own z.
+    pub fn write_one(&self, z: &[f64], sequence: usize, states: &mut InitialStates) {
+        for (i, z) in z.iter().enumerate() {
             if self.learns[i] {
-                states.values_mut()[index] = states.mean()[i] + self.s * z;
+                states.sequence_mut(sequence)[i] = states.mean()[i] + self.s * z;
             }
         }
     }

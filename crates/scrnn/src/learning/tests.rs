@@ -269,6 +269,35 @@ fn a_checkpoint_without_the_pairs_of_lbfgs_or_with_impossible_ones_is_refused() 
 }
 
 #[test]
+fn ten_times_the_sequences_take_ten_times_as_long() {
+    // One step each, and many units: what is done for all sequences at each update would show.
+    let topology = Topology::s_ctrnn(1, 64, 2.0).unwrap();
+    let learner = |sequences: usize| {
+        let (network, states) = initialize(&topology, sequences, 5);
+        let plan = Plan { optimiser: Optimiser::Adam(Adam { batch_size: 10, ..Adam::default() }), ..adam(1000) };
+        Learner::new(network, states, &waves(sequences, 2), plan, &Engine::serial()).unwrap()
+    };
+    let mut fastest = [f64::INFINITY; 2];
+    let mut learners = [learner(1000), learner(10_000)];
+    for _ in 0..4 {
+        for (learner, fastest) in learners.iter_mut().zip(&mut fastest) {
+            // Two epochs each time: the second one's duration.
+            let (end, mut begin) = (learner.epoch() + 2, std::time::Instant::now());
+            learner.run(&mut |report: &EpochReport, _: &Learner| {
+                if report.epoch + 1 == end {
+                    begin = std::time::Instant::now();
+                }
+                if report.epoch < end { Control::Continue } else { Control::Stop }
+            });
+            *fastest = fastest.min(begin.elapsed().as_secs_f64());
+        }
+    }
+    // Were it quadratic, a hundred times.
+    let ratio = fastest[1] / fastest[0];
+    assert!(ratio < 25.0, "{ratio}: {fastest:?} s");
+}
+
+#[test]
 fn recomputation_learns_the_same_bits() {
     let learn = |recompute| {
         let mut learner = learner(Plan { recompute, ..adam(20) }, 1);
