@@ -27,9 +27,9 @@ const NARROW: usize = 6;
 const WIDE: usize = 24;
 /// Bytes of recurrent weights up to which blocks stay narrow.
 const NEAR: usize = 512 << 10;
-/// Recurrent weights times steps of all columns from which on two blocks pay: some 0.2 ms of one thread, ten times what it takes to
-/// wake another.
-const WORTH_TWO: usize = 1 << 20;
+/// Recurrent weights times steps of all columns from which on two blocks pay: at least 0.5 ms of one thread, ten times what it
+/// takes to wake another.
+const WORTH_TWO: usize = 1 << 22;
 
 impl Block {
     /// Takes over the columns `own`, ordered by length, of `runs`.
@@ -146,8 +146,8 @@ mod tests {
         assert_eq!(columns(60, 4, 1000), [2, 2]);
         assert_eq!(columns(60, 3, 1000), [3]);
         assert_eq!(columns(60, 7, 10), [4, 3]);
-        // 3600 weights: 6 columns of 48 steps are 1 036 800, of 49 steps 1 058 400; the bound is 1 048 576.
-        assert_eq!((columns(60, 6, 48), columns(60, 6, 49)), (vec![6], vec![3, 3]));
+        // 3600 weights: 6 columns of 194 steps are 4 190 400, of 195 steps 4 212 000; the bound is 4 194 304.
+        assert_eq!((columns(60, 6, 194), columns(60, 6, 195)), (vec![6], vec![3, 3]));
         assert_eq!((columns(300, 12, 1000), columns(300, 13, 1000)), (vec![12], vec![7, 6]));
     }
 
