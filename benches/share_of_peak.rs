@@ -16,6 +16,7 @@ mod machine;
 mod plain_nalgebra;
 mod training;
 
+use std::ops::ControlFlow;
 use std::time::Duration;
 
 use arguments::Arguments;
@@ -25,7 +26,7 @@ use scrnn::dataset::Dataset;
 use scrnn::engine::InstructionSet;
 use scrnn::initialization::initialize;
 use scrnn::kernels::padded;
-use scrnn::learning::{Control, EpochReport, Learner};
+use scrnn::learning::{EpochReport, Learner};
 use scrnn::topology::Topology;
 use scrnn_tasks::lissajous;
 use serde_json::{Value, json};
@@ -180,7 +181,7 @@ fn agree(learner: &mut Learner, plain: &plain_nalgebra::Gradient) {
         let terms = -report.ln_likelihood / report.nll.expect("an S-CTRNN has variance units");
         let (ours, theirs) = (report.gradient_norm, plain.norm() / terms);
         assert!(close(ours, theirs), "the gradient is {ours} long, by nalgebra {theirs}");
-        Control::Stop
+        ControlFlow::Break(())
     });
 }
 

@@ -1,10 +1,11 @@
 //! Another way to compute, put in from outside: plain loops and differences in place of the engine.
 
+use std::ops::ControlFlow;
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::engine::Engine;
 use scrnn::error::Result;
 use scrnn::initialization::initialize;
-use scrnn::learning::{Adam, Control, EpochReport, Lbfgs, Learner, Momentum, Optimiser, Plan};
+use scrnn::learning::{Adam, EpochReport, Lbfgs, Learner, Momentum, Optimiser, Plan};
 use scrnn::likelihood;
 use scrnn::network::Network;
 use scrnn::objective::{Backend, Evaluation, Objective, Request, Run, Want};
@@ -102,7 +103,7 @@ fn learning_and_recognition_compute_on_whatever_backend_they_get() {
             let mut history = Vec::new();
             let _ = learner.run(&mut |report: &EpochReport, _: &Learner| {
                 history.push(report.ln_likelihood);
-                Control::Continue
+                ControlFlow::Continue(())
             });
             let options = RecognitionOptions { starts: 3, epochs: 10, ..RecognitionOptions::default() };
             let found = recognize(learner.network(), learner.initial_states(), &data(), &options, backend).unwrap();

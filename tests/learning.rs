@@ -1,5 +1,6 @@
 //! Learning as the thesis prescribes it: the rules of ascent step by step, and the shipped experiments on the sine wave.
 
+use std::ops::ControlFlow;
 use std::f64::consts::TAU;
 
 use assert_cmd::Command;
@@ -7,7 +8,7 @@ use scrnn::dataset::{Dataset, Sequence};
 use scrnn::engine::Engine;
 use scrnn::initial_states::InitialStates;
 use scrnn::initialization::initialize;
-use scrnn::learning::{AdaptiveRate, Control, EpochReport, Learner, Momentum, Optimiser, Plan};
+use scrnn::learning::{AdaptiveRate, EpochReport, Learner, Momentum, Optimiser, Plan};
 use scrnn::topology::Topology;
 use serde_json::Value;
 
@@ -39,7 +40,7 @@ fn run(learner: &mut Learner) -> Vec<EpochReport> {
     let mut reports = Vec::new();
     learner.run(&mut |report: &EpochReport, _: &Learner| {
         reports.push(report.clone());
-        Control::Continue
+        ControlFlow::Continue(())
     });
     reports
 }
@@ -77,7 +78,7 @@ fn each_step_adds_eta_times_the_last_one() {
 #[test]
 fn the_adaptive_rate_withdraws_steps_that_let_the_error_grow() {
     let adaptive = AdaptiveRate { max_error_ratio: 1.02, ..AdaptiveRate::default() };
-    let options = Momentum { rate: 0.3, adaptive: Some(adaptive), ..Momentum::default() };
+    let options = Momentum { rate: 0.3, adaptive_rate: Some(adaptive), ..Momentum::default() };
     let reports = run(&mut learner(plan(300, options)));
     let (mut raised, mut lowered) = (0, 0);
     for pair in reports.windows(2) {

@@ -1,13 +1,14 @@
 //! The memory of a training, of all threads together: as much as docs/performance.md says, and no more of it after the first
 //! epochs.
 
+use std::ops::ControlFlow;
 use std::alloc::System;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::engine::{Engine, InstructionSet};
 use scrnn::initialization::initialize;
-use scrnn::learning::{Adam, Control, EpochReport, Learner, Momentum, Optimiser, Plan, PriorStep};
+use scrnn::learning::{Adam, EpochReport, Learner, Momentum, Optimiser, Plan, PriorStep};
 use scrnn::topology::{Prediction, Topology};
 use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
 
@@ -29,8 +30,8 @@ fn waves(sequences: usize, steps: usize) -> Dataset {
 }
 
 /// Stops at an epoch.
-fn until(last: u64) -> impl FnMut(&EpochReport, &Learner) -> Control {
-    move |report, _| if report.epoch < last { Control::Continue } else { Control::Stop }
+fn until(last: u64) -> impl FnMut(&EpochReport, &Learner) -> ControlFlow<()> {
+    move |report, _| if report.epoch < last { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
 }
 
 /// What docs/performance.md says that a training by Adam in batches takes, in bytes.

@@ -1,6 +1,7 @@
 //! What the library refuses, in words that say what was found and what was needed; and what it does at the edge of the finite
 //! numbers. The program refuses most of this sooner, with a file and a line.
 
+use std::ops::ControlFlow;
 use scrnn::analysis::mixture::{GaussianMixture, MixtureOptions};
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::engine::{Engine, InstructionSet};
@@ -9,7 +10,7 @@ use scrnn::error_regression::{Ascent, ErrorRegression, ErrorRegressionOptions};
 use scrnn::generation::{Feedback, Running};
 use scrnn::initial_states::InitialStates;
 use scrnn::initialization::initialize;
-use scrnn::learning::{Adam, Control, EpochReport, Learner, Optimiser, Outcome, Plan};
+use scrnn::learning::{Adam, EpochReport, Learner, Optimiser, Outcome, Plan};
 use scrnn::network::Network;
 use scrnn::parameters::Block;
 use scrnn::recognition::{RecognitionOptions, recognize};
@@ -107,7 +108,7 @@ fn a_gradient_beyond_all_numbers_is_a_divergence_that_names_its_block() {
     let data = Dataset::new(vec!["a".into(), "b".into()], vec![near("one"), near("two")]).unwrap();
     let plan = Plan { epochs: 3, optimiser: Optimiser::Adam(Adam::default()), ..Plan::default() };
     let mut learner = Learner::new(network, states, &data, plan, &engine).unwrap();
-    let ended = learner.run(&mut |_: &EpochReport, _: &Learner| Control::Continue);
+    let ended = learner.run(&mut |_: &EpochReport, _: &Learner| ControlFlow::Continue(()));
     let Outcome::Diverged(divergence) = ended else { panic!("did not diverge") };
     let told = divergence.to_string();
     assert!(told.contains("diverged at epoch 0") && told.contains("gradient of "), "{told}");
@@ -119,7 +120,7 @@ fn error_regression_refuses_what_it_cannot_use() {
     let new = |state: &[f64], change: &dyn Fn(&mut ErrorRegressionOptions)| {
         let mut options = ErrorRegressionOptions::new(2);
         change(&mut options);
-        ErrorRegression::new(&network, state, options, InstructionSet::Portable)
+        ErrorRegression::new(&network, state, options, &Engine::new(1, InstructionSet::Portable).unwrap())
     };
     refused(new(&[0.0; 4], &|_| ()), &["initial state", "4", "5"]);
     refused(
@@ -136,7 +137,7 @@ fn a_shortened_gradient_moves_the_state_less() {
         let ascent = Ascent::Momentum { rate: 1e-2, momentum: 0.0 };
         let options =
             ErrorRegressionOptions { window: 10, iterations: 1, ascent, max_norm, ..ErrorRegressionOptions::new(2) };
-        let mut regression = ErrorRegression::new(&network, &[0.1; UNITS], options, InstructionSet::Portable).unwrap();
+        let mut regression = ErrorRegression::new(&network, &[0.1; UNITS], options, &Engine::new(1, InstructionSet::Portable).unwrap()).unwrap();
         let mut gain = 0.0;
         for k in 0..30 {
             let sample = [0.9 * (0.7 * f64::from(k)).sin(), -0.8];
@@ -155,7 +156,7 @@ fn a_network_without_variance_runs_beside_a_world_and_can_change_its_feedback() 
     let (network, _) = initialize(&topology(Prediction::Mean), 1, 3);
     let run = |change: bool| {
         let set = InstructionSet::Portable;
-        let mut running = Running::new(&network, &[0.2; UNITS], Feedback::open(2), 1, set).unwrap();
+        let mut running = Running::new(&network, &[0.2; UNITS], Feedback::open(2), 1, &Engine::new(1, set).unwrap()).unwrap();
         for k in 0..20 {
             if change && k == 10 {
                 running.set_feedback(Feedback::closed(2, false)).unwrap();

@@ -1,11 +1,12 @@
 //! Networks in training at given sizes, and the time that their epochs take.
 
+use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::engine::{Engine, InstructionSet};
 use scrnn::initialization::initialize;
-use scrnn::learning::{Adam, Control, EpochReport, Learner, Optimiser, Plan};
+use scrnn::learning::{Adam, EpochReport, Learner, Optimiser, Plan};
 use scrnn::topology::Topology;
 
 /// Smooth sequences that give `steps` steps of prediction each, between -0.8 and 0.8, no two alike.
@@ -46,10 +47,10 @@ impl Training {
                 start = Instant::now();
             } else if seen == epochs {
                 elapsed = start.elapsed();
-                return Control::Stop;
+                return ControlFlow::Break(());
             }
             seen += 1;
-            Control::Continue
+            ControlFlow::Continue(())
         });
         assert!(seen == epochs, "the training ended after {seen} of {epochs} epochs");
         elapsed

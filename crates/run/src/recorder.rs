@@ -1,10 +1,11 @@
 //! Keeps a training's run folder up to date: checkpoints, the best network, the history; and watches for Ctrl-C.
 
+use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use scrnn::checkpoint::{Checkpoint, OptimiserState};
 use scrnn::initial_states::InitialStates;
-use scrnn::learning::{Control, EpochReport, Learner, Observer, Outcome, Recovery};
+use scrnn::learning::{EpochReport, Learner, Observer, Outcome, Recovery};
 use scrnn::parameters::Parameters;
 use scrnn::scaling::Scaling;
 
@@ -207,7 +208,7 @@ impl<'a> Recorder<'a> {
 }
 
 impl Observer for Recorder<'_> {
-    fn epoch(&mut self, report: &EpochReport, learner: &Learner) -> Control {
+    fn epoch(&mut self, report: &EpochReport, learner: &Learner) -> ControlFlow<()> {
         let score = Score { epoch: report.epoch, nll: report.nll, mse: report.mse };
         self.notes.score = Some(score);
         self.compare(score, learner);
@@ -222,9 +223,9 @@ impl Observer for Recorder<'_> {
             && let Err(failure) = self.save(learner)
         {
             self.failure = Some(failure);
-            return Control::Stop;
+            return ControlFlow::Break(());
         }
-        if stop { Control::Stop } else { Control::Continue }
+        if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
     fn recovered(&mut self, recovery: &Recovery) {

@@ -25,7 +25,7 @@ use aligned_vec::AVec;
 use pulp::{Simd, WithSimd};
 
 use crate::backward::retreat;
-use crate::engine::{InstructionSet, Run};
+use crate::engine::{Engine, InstructionSet, Run};
 use crate::error::{Error, Result};
 use crate::forward::{activate, advance};
 use crate::kernels::activation::{exp_slice, tanh_rows};
@@ -101,7 +101,7 @@ impl ErrorRegression {
         network: &Network,
         initial_state: &[f64],
         options: ErrorRegressionOptions,
-        set: InstructionSet,
+        engine: &Engine,
     ) -> Result<Self> {
         let topology = &network.topology;
         let (n_x, n_c, delay) = (topology.channels(), topology.context_units(), topology.delay());
@@ -110,6 +110,7 @@ impl ErrorRegression {
             let what = "the initial state".to_owned();
             return Err(Error::Length { what, found: initial_state.len(), needed: n_c });
         }
+        let set = engine.instruction_set();
         let mut packed = Packed::new(topology, set);
         packed.fill(&network.parameters);
         let mut to_input = Panels::zeros(n_x, n_c, chains_for(n_x), set);

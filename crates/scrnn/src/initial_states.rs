@@ -6,6 +6,7 @@
 //!
 //! The sums run over units whose group learns its initial state; all others start from 0 and stay there.
 
+use crate::error::{Error, Result};
 use crate::topology::Topology;
 
 /// u_0 for every sequence, and the mean u.
@@ -22,6 +23,35 @@ impl InitialStates {
     pub fn zeros(topology: &Topology, sequences: usize) -> Self {
         let units = topology.context_units();
         Self { units, values: vec![0.0; sequences * units], mean: vec![0.0; units] }
+    }
+
+    /// Given values: u_0 of all sequences, row-major `[S, N_C]`, and their mean.
+    ///
+    /// # Errors
+    /// [`Error::Length`] if they do not fit the topology's context units.
+    pub fn new(topology: &Topology, values: Vec<f64>, mean: Vec<f64>) -> Result<Self> {
+        let units = topology.context_units();
+        if !values.len().is_multiple_of(units) {
+            let needed = values.len().next_multiple_of(units);
+            return Err(Error::Length { what: "the list of initial states".to_owned(), found: values.len(), needed });
+        }
+        let states = Self { units, values, mean };
+        states.check_for(topology)?;
+        Ok(states)
+    }
+
+    /// Checks that these are states of a network of this topology.
+    ///
+    /// # Errors
+    /// [`Error::Length`] for another number of context units.
+    pub fn check_for(&self, topology: &Topology) -> Result<()> {
+        let needed = topology.context_units();
+        for (what, found) in [("an initial state", self.units), ("the mean of the initial states", self.mean.len())] {
+            if found != needed {
+                return Err(Error::Length { what: what.to_owned(), found, needed });
+            }
+        }
+        Ok(())
     }
 
     /// Number of sequences.

@@ -29,7 +29,8 @@
 //! use scrnn::engine::Engine;
 //! use scrnn::generation::{Feedback, GenerationOptions, Start, generate};
 //! use scrnn::initialization::initialize;
-//! use scrnn::learning::{Adam, Control, EpochReport, Learner, Optimiser, Outcome, Plan};
+//! use std::ops::ControlFlow;
+//! use scrnn::learning::{Adam, EpochReport, Learner, Optimiser, Outcome, Plan};
 //! use scrnn::recognition::{RecognitionOptions, recognize};
 //! use scrnn::topology::Topology;
 //!
@@ -55,7 +56,7 @@
 //! let mut nll = Vec::new();
 //! let outcome = learner.run(&mut |report: &EpochReport, _: &Learner| {
 //!     nll.extend(report.nll);
-//!     Control::Continue
+//!     ControlFlow::Continue(())
 //! });
 //! assert_eq!(outcome, Outcome::Finished);
 //! assert!(nll[800] < nll[0] - 1.0, "nats per step and channel: {} to {}", nll[0], nll[800]);
@@ -104,7 +105,9 @@
 //! - A training that leaves the finite numbers is no error but an [`Outcome`](learning::Outcome): it is rolled back to the
 //!   last good epoch and says where it happened.
 
+#[cfg(feature = "analysis")]
 pub mod analysis;
+#[cfg(feature = "checkpoint")]
 pub mod checkpoint;
 pub mod dataset;
 pub mod engine;
@@ -115,6 +118,7 @@ pub mod forward;
 pub mod generation;
 pub mod initial_states;
 pub mod initialization;
+#[doc(hidden)]
 pub mod kernels;
 pub mod learning;
 pub mod likelihood;
@@ -125,6 +129,21 @@ pub mod recognition;
 pub mod scaling;
 pub mod streams;
 pub mod topology;
+
+#[cfg(feature = "checkpoint")]
+pub use checkpoint::Checkpoint;
+pub use dataset::{Dataset, Sequence};
+pub use engine::{Engine, InstructionSet};
+pub use error::{Error, Result};
+pub use error_regression::{ErrorRegression, ErrorRegressionOptions};
+pub use generation::{Feedback, Generated, GenerationOptions, Start, generate};
+pub use initial_states::InitialStates;
+pub use initialization::initialize;
+pub use learning::{Adam, Learner, Momentum, Observer, Optimiser, Outcome, Plan};
+pub use network::Network;
+pub use recognition::{Recognition, RecognitionOptions, recognize};
+pub use scaling::Scaling;
+pub use topology::{Group, Prediction, Topology};
 
 mod backward;
 mod batch;

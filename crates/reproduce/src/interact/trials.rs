@@ -256,7 +256,7 @@ impl Subject<'_> {
         let set = self.engine.instruction_set();
         let (mut means, mut early, mut taken) = (Vec::new(), Vec::new(), Vec::new());
         for sequence in self.data.sequences().iter().step_by(every) {
-            let mut regression = ErrorRegression::new(self.network, state, options.clone(), set)?;
+            let mut regression = ErrorRegression::new(self.network, state, options.clone(), self.engine)?;
             let (mut next, mut ahead) = (Vec::new(), Vec::new());
             for k in 0..sequence.len() {
                 let begun = Instant::now();

@@ -1,6 +1,6 @@
 //! What the types of the experiment file cannot rule out. A complaint names its key, so that the reader can point at it.
 
-use super::{Adam, AdaptiveRate, Data, Experiment, Lbfgs, Momentum, Network, Output, ScalingChoice, TaskName};
+use super::{Adam, Data, Experiment, Lbfgs, Momentum, Network, Output, ScalingChoice, TaskName, Training};
 
 /// A value that will not do.
 #[derive(Debug, PartialEq)]
@@ -33,10 +33,6 @@ fn not_negative(path: &[&str], value: f64) -> Check {
     must(value >= 0.0 && value.is_finite(), path, value, "0 or a number above it")
 }
 
-fn below_one(path: &[&str], value: f64) -> Check {
-    must((0.0..1.0).contains(&value), path, value, "a number from 0 to just below 1")
-}
-
 /// Checks all values.
 pub fn check(experiment: &Experiment) -> Check {
     let name = &experiment.name;
@@ -44,18 +40,10 @@ pub fn check(experiment: &Experiment) -> Check {
     must(folder, &["name"], format!("{name:?}"), "a name that a folder can have")?;
     check_data(&experiment.data)?;
     check_network(&experiment.network)?;
-    if let Some(momentum) = &experiment.training.momentum {
-        check_momentum(momentum)?;
-    }
-    if let Some(adam) = &experiment.training.adam {
-        check_adam(adam)?;
-    }
-    if let Some(Lbfgs { share, memory }) = experiment.training.lbfgs {
-        let key = |key| ["training", "lbfgs", key];
-        must((0.0..=1.0).contains(&share), &key("share"), share, "a number from 0 to 1")?;
-        // Twice as many numbers as parameters for each.
-        must((1..=1000).contains(&memory), &key("memory"), memory, "a number from 1 to 1000")?;
-    }
+    let Training { momentum, adam, lbfgs, .. } = &experiment.training;
+    of_library(momentum.as_ref().map_or(Ok(()), Momentum::check))?;
+    of_library(adam.as_ref().map_or(Ok(()), Adam::check))?;
+    of_library(lbfgs.as_ref().map_or(Ok(()), Lbfgs::check))?;
     check_output(&experiment.output)
 }
 
@@ -156,32 +144,17 @@ fn check_network(network: &Network) -> Check {
     must(driven, &groups, "without a group that drives the outputs", "drives_output = true in one group")
 }
 
-fn check_momentum(options: &Momentum) -> Check {
-    let key = |key| ["training", "momentum", key];
-    positive(&key("rate"), options.rate)?;
-    below_one(&key("momentum"), options.momentum)?;
-    let Some(AdaptiveRate { max_error_ratio, decrease, increase, max_tries }) = options.adaptive_rate else {
-        return Ok(());
-    };
-    let key = |key| ["training", "momentum", "adaptive_rate", key];
-    must(max_error_ratio >= 1.0, &key("max_error_ratio"), max_error_ratio, "a number, at least 1")?;
-    must(decrease > 0.0 && decrease < 1.0, &key("decrease"), decrease, "a number between 0 and 1")?;
-    must(increase >= 1.0 && increase.is_finite(), &key("increase"), increase, "a number, at least 1")?;
-    must(max_tries >= 1, &key("max_tries"), max_tries, "at least 1")
-}
-
-fn check_adam(options: &Adam) -> Check {
-    let key = |key| ["training", "adam", key];
-    positive(&key("rate"), options.rate)?;
-    below_one(&key("warm_up"), options.warm_up)?;
-    not_negative(&key("final_rate"), options.final_rate)?;
-    not_negative(&key("clip_norm"), options.clip_norm)?;
-    not_negative(&key("weight_decay"), options.weight_decay)?;
-    not_negative(&key("initial_state_factor"), options.initial_state_factor)?;
-    not_negative(&key("mean_factor"), options.mean_factor)?;
-    below_one(&key("beta1"), options.beta1)?;
-    below_one(&key("beta2"), options.beta2)?;
-    positive(&key("epsilon"), options.epsilon)
+/// What the library refuses, with its key in the experiment file.
+fn of_library(checked: scrnn::error::Result<()>) -> Check {
+    use scrnn::error::Error;
+    match checked {
+        Ok(()) => Ok(()),
+        Err(Error::Setting { what, found, needed }) => {
+            let path: Vec<&str> = std::iter::once("training").chain(what.split('.')).collect();
+            must(false, &path, found, needed)
+        }
+        Err(other) => complaint(&["training"], other.to_string(), "settings that the library takes"),
+    }
 }
 
 fn check_output(output: &Output) -> Check {

@@ -3,13 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use scrnn::dataset::Dataset;
-use scrnn::learning::{self, Optimiser, Plan};
+use scrnn::learning::{Optimiser, Plan};
 use scrnn::scaling::Scaling;
-use scrnn::topology::{self, Prediction, Topology};
+use scrnn::topology::{Prediction, Topology};
 
 use super::{
-    Adam, AdaptiveRate, Data, Experiment, Group, Lbfgs, Momentum, OnDivergence, OptimiserName, PriorStep,
-    ScalingChoice, ScalingConstants, ScalingName, ScalingRanges, TaskName, Training,
+    Data, Experiment, OptimiserName, ScalingChoice, ScalingConstants, ScalingName, ScalingRanges, TaskName, Training,
 };
 use crate::failure::{Failure, Result};
 use scrnn_data::Selection;
@@ -32,8 +31,7 @@ impl Experiment {
         } else {
             Prediction::Mean
         };
-        let groups = network.groups.iter().map(topology::Group::from).collect();
-        Ok(Topology::new(channels, network.delay, groups, prediction)?)
+        Ok(Topology::new(channels, network.delay, network.groups.clone(), prediction)?)
     }
 
     /// How to learn. The experiment is a resolved one.
@@ -41,20 +39,17 @@ impl Experiment {
         let training = &self.training;
         let optimiser = match training.optimiser {
             OptimiserName::Momentum => {
-                Optimiser::Momentum(training.momentum.as_ref().map(Into::into).unwrap_or_default())
+                Optimiser::Momentum(training.momentum.clone().unwrap_or_default())
             }
-            OptimiserName::Adam => Optimiser::Adam(training.adam.as_ref().map(Into::into).unwrap_or_default()),
+            OptimiserName::Adam => Optimiser::Adam(training.adam.clone().unwrap_or_default()),
         };
         Plan {
             epochs: training.epochs,
             initial_state_variance: self.network.initial_state_variance,
             optimiser,
-            lbfgs: training.lbfgs.as_ref().map(Into::into),
+            lbfgs: training.lbfgs.clone(),
             recompute: training.recompute,
-            on_divergence: match training.on_divergence {
-                OnDivergence::Recover => learning::OnDivergence::Recover,
-                OnDivergence::Stop => learning::OnDivergence::Stop,
-            },
+            on_divergence: training.on_divergence,
         }
     }
 }
@@ -152,132 +147,6 @@ impl Training {
                 self.adam.get_or_insert_default();
                 self.momentum = None;
             }
-        }
-    }
-}
-
-impl From<&Group> for topology::Group {
-    fn from(group: &Group) -> Self {
-        Self {
-            name: group.name.clone(),
-            units: group.units,
-            time_constant: group.time_constant,
-            receives_input: group.receives_input,
-            drives_output: group.drives_output,
-            learns_initial_state: group.learns_initial_state,
-        }
-    }
-}
-
-impl From<&Momentum> for learning::Momentum {
-    fn from(options: &Momentum) -> Self {
-        Self {
-            rate: options.rate,
-            momentum: options.momentum,
-            prior: match options.prior {
-                PriorStep::Implicit => learning::PriorStep::Implicit,
-                PriorStep::Thesis => learning::PriorStep::Thesis,
-            },
-            adaptive: options.adaptive_rate.as_ref().map(|adaptive| learning::AdaptiveRate {
-                max_error_ratio: adaptive.max_error_ratio,
-                decrease: adaptive.decrease,
-                increase: adaptive.increase,
-                max_tries: adaptive.max_tries,
-            }),
-        }
-    }
-}
-
-impl Default for Momentum {
-    fn default() -> Self {
-        let learning::Momentum { rate, momentum, prior, .. } = learning::Momentum::default();
-        let prior = match prior {
-            learning::PriorStep::Implicit => PriorStep::Implicit,
-            learning::PriorStep::Thesis => PriorStep::Thesis,
-        };
-        Self { rate, momentum, prior, adaptive_rate: None }
-    }
-}
-
-impl Default for AdaptiveRate {
-    fn default() -> Self {
-        let learning::AdaptiveRate { max_error_ratio, decrease, increase, max_tries } =
-            learning::AdaptiveRate::default();
-        Self { max_error_ratio, decrease, increase, max_tries }
-    }
-}
-
-impl From<&Lbfgs> for learning::Lbfgs {
-    fn from(&Lbfgs { share, memory }: &Lbfgs) -> Self {
-        Self { share, memory }
-    }
-}
-
-impl Default for Lbfgs {
-    fn default() -> Self {
-        let learning::Lbfgs { share, memory } = learning::Lbfgs::default();
-        Self { share, memory }
-    }
-}
-
-impl From<&Adam> for learning::Adam {
-    fn from(options: &Adam) -> Self {
-        let &Adam {
-            rate,
-            warm_up,
-            final_rate,
-            clip_norm,
-            weight_decay,
-            batch_size,
-            initial_state_factor,
-            mean_factor,
-            beta1,
-            beta2,
-            epsilon,
-        } = options;
-        Self {
-            rate,
-            warm_up,
-            final_rate,
-            clip_norm,
-            weight_decay,
-            batch_size,
-            initial_state_factor,
-            mean_factor,
-            beta1,
-            beta2,
-            epsilon,
-        }
-    }
-}
-
-impl Default for Adam {
-    fn default() -> Self {
-        let learning::Adam {
-            rate,
-            warm_up,
-            final_rate,
-            clip_norm,
-            weight_decay,
-            batch_size,
-            initial_state_factor,
-            mean_factor,
-            beta1,
-            beta2,
-            epsilon,
-        } = learning::Adam::default();
-        Self {
-            rate,
-            warm_up,
-            final_rate,
-            clip_norm,
-            weight_decay,
-            batch_size,
-            initial_state_factor,
-            mean_factor,
-            beta1,
-            beta2,
-            epsilon,
         }
     }
 }

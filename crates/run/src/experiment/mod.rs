@@ -19,6 +19,8 @@ use serde::{Deserialize, Serialize};
 pub use difference::{Difference, differences};
 pub use overrides::Override;
 pub use reading::{read, read_text};
+pub use scrnn::learning::{Adam, AdaptiveRate, Lbfgs, Momentum, OnDivergence, PriorStep};
+pub use scrnn::topology::Group;
 pub use scrnn_tasks::TaskName;
 
 /// What to learn, with which network and how.
@@ -148,6 +150,10 @@ pub struct Network {
     pub groups: Vec<Group>,
 }
 
+fn recover() -> OnDivergence {
+    OnDivergence::Recover
+}
+
 fn one_step() -> usize {
     1
 }
@@ -158,27 +164,6 @@ fn yes() -> bool {
 
 fn unit() -> f64 {
     1.0
-}
-
-/// Context units that share a time constant.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Group {
-    /// The group's name.
-    pub name: String,
-    /// Number of units.
-    pub units: usize,
-    /// Time constant in steps, at least 1.
-    pub time_constant: f64,
-    /// Whether the input projects to the group.
-    #[serde(default = "yes")]
-    pub receives_input: bool,
-    /// Whether the group projects to the outputs.
-    #[serde(default = "yes")]
-    pub drives_output: bool,
-    /// Whether each sequence has an initial state of its own here; otherwise the group starts from 0.
-    #[serde(default = "yes")]
-    pub learns_initial_state: bool,
 }
 
 /// How the network learns.
@@ -194,7 +179,7 @@ pub struct Training {
     #[serde(default)]
     pub recompute: bool,
     /// What to do when training leaves its course.
-    #[serde(default)]
+    #[serde(default = "recover")]
     pub on_divergence: OnDivergence,
     /// Options of "momentum".
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -207,18 +192,6 @@ pub struct Training {
     pub lbfgs: Option<Lbfgs>,
 }
 
-/// What to do when training leaves its course.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum OnDivergence {
-    /// Goes back to the best network, halves the rate and goes on: when a value is not finite, and when the nll rises by more
-    /// than 10 nats above its best. After twenty times it stops.
-    #[default]
-    Recover,
-    /// Stops when a value is not finite, at the last good epoch. The rule of ascent is never interfered with.
-    Stop,
-}
-
 /// The rules of ascent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -227,84 +200,6 @@ pub enum OptimiserName {
     Momentum,
     /// Adam with warm-up, cosine decay and norm clipping.
     Adam,
-}
-
-/// Gradient ascent with momentum (2.17-2.19, 2.7).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct Momentum {
-    /// The thesis' alpha with a tilde: divided by the number of steps and channels it is the rate of the weights.
-    pub rate: f64,
-    /// eta: how much of the last step is taken again.
-    pub momentum: f64,
-    /// How initial states follow their prior.
-    pub prior: PriorStep,
-    /// The adaptive rate of appendix D.1; an empty table turns it on.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub adaptive_rate: Option<AdaptiveRate>,
-}
-
-/// How initial states follow their prior.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum PriorStep {
-    /// An implicit step, stable for any variance of the prior.
-    Implicit,
-    /// The thesis' literal rule; unstable where the prior is narrow.
-    Thesis,
-}
-
-/// The adaptive rate (D.1).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct AdaptiveRate {
-    /// r_th: a step that makes the squared error larger than this many times is undone.
-    pub max_error_ratio: f64,
-    /// alpha_dec: the rate's factor after an undone step.
-    pub decrease: f64,
-    /// alpha_inc: the rate's factor after a step that made the error smaller.
-    pub increase: f64,
-    /// Largest number of tries in one epoch.
-    pub max_tries: u32,
-}
-
-/// Adam. The weights' rate warms up, then decays to `final_rate` along a cosine.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct Adam {
-    /// The peak rate.
-    pub rate: f64,
-    /// Share of the epochs in which the rate climbs to its peak.
-    pub warm_up: f64,
-    /// The rate at the last epoch.
-    pub final_rate: f64,
-    /// The gradient's norm is cut down to this; 0 never cuts.
-    pub clip_norm: f64,
-    /// Every update takes this times the rate off each weight; biases keep theirs.
-    pub weight_decay: f64,
-    /// Sequences that an update learns from; 0 takes all. An epoch makes as many updates as it takes to meet every sequence once.
-    pub batch_size: usize,
-    /// Initial states learn at this many times the rate.
-    pub initial_state_factor: f64,
-    /// Their mean learns at this many times the rate.
-    pub mean_factor: f64,
-    /// Decay of the gradient's average.
-    pub beta1: f64,
-    /// Decay of the squared gradient's average.
-    pub beta2: f64,
-    /// Keeps the division finite.
-    pub epsilon: f64,
-}
-
-/// L-BFGS over all sequences at once, after the optimiser. Where a small network has to be exact it gets far further; it climbs to the
-/// nearest maximum. An epoch is an update, which sees all sequences 1.1 times on average.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct Lbfgs {
-    /// Share of the epochs, the last ones, that are its own; 1 leaves none to the optimiser.
-    pub share: f64,
-    /// How many updates it remembers.
-    pub memory: usize,
 }
 
 /// What is written while the network learns.

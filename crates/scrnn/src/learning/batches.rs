@@ -13,7 +13,7 @@ use rand::seq::SliceRandom;
 
 use super::adam::{self, AdamRule};
 use super::state::Fields;
-use crate::checkpoint::{OptimiserState, StateTensor};
+use super::state::{OptimiserState, StateTensor};
 use crate::error::Result;
 use crate::initial_states::InitialStates;
 use crate::objective::{Evaluation, Objective, Run, Want};

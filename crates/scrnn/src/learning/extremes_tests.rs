@@ -1,5 +1,6 @@
 //! Learning at the edges of numbers and of data. What must come out is what a user would want: a network, or a word; never NaN.
 
+use std::ops::ControlFlow;
 use super::*;
 use crate::dataset::{Dataset, Sequence};
 use crate::engine::Engine;
@@ -45,7 +46,7 @@ fn run(learner: &mut Learner) -> (Outcome, Vec<f64>) {
             "{report:?}"
         );
         nll.push(report.nll.unwrap_or(report.mse));
-        Control::Continue
+        ControlFlow::Continue(())
     });
     assert!(nll.iter().all(|value| value.is_finite()));
     finite(learner.network(), learner.initial_states());
@@ -220,7 +221,7 @@ fn any_rate_ends_in_a_network_of_numbers() {
     for rate in [1e-300, 1e-12, 1.0, 1e3, 1e12, 1e150, 1e300] {
         for optimiser in [
             Optimiser::Momentum(Momentum { rate, ..Momentum::default() }),
-            Optimiser::Momentum(Momentum { rate, adaptive: Some(AdaptiveRate::default()), ..Momentum::default() }),
+            Optimiser::Momentum(Momentum { rate, adaptive_rate: Some(AdaptiveRate::default()), ..Momentum::default() }),
             Optimiser::Adam(Adam { rate, ..Adam::default() }),
         ] {
             let with_and_without = [None, Some(Lbfgs { share: 0.5, memory: 5 })];

@@ -7,7 +7,7 @@ use super::batches::Batches;
 use super::coordinates::Coordinates;
 use super::plan::Lbfgs;
 use super::state::Fields;
-use crate::checkpoint::OptimiserState;
+use super::state::OptimiserState;
 use crate::error::{Error, Result};
 use crate::initial_states::InitialStates;
 use crate::parameters::Parameters;

@@ -1,5 +1,6 @@
 //! The loop of learning: evaluate, report, ascend.
 
+use std::ops::ControlFlow;
 use super::adam::AdamRule;
 use super::batches::Batches;
 use super::divergence::Divergence;
@@ -8,21 +9,12 @@ use super::lbfgs::LbfgsRule;
 use super::momentum::MomentumRule;
 use super::plan::{OnDivergence, Optimiser, Plan};
 use super::state::Fields;
-use crate::checkpoint::OptimiserState;
+use super::state::OptimiserState;
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
 use crate::initial_states::InitialStates;
 use crate::network::Network;
 use crate::objective::{Backend, Request, Run};
-
-/// Whether to go on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Control {
-    /// Go on.
-    Continue,
-    /// Stop before the next update.
-    Stop,
-}
 
 /// What the evaluation of an epoch found.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,20 +47,22 @@ pub struct EpochReport {
 pub trait Observer {
     /// Called before each epoch, and after the last: a run of N epochs makes N + 1 calls. `learner` holds what was evaluated (in
     /// batches, what came out of it): saved here and restored later, a training goes on bit for bit.
-    fn epoch(&mut self, report: &EpochReport, learner: &Learner) -> Control;
+    fn epoch(&mut self, report: &EpochReport, learner: &Learner) -> ControlFlow<()>;
 
     /// Called when a training that left its course was brought back, before it goes on.
     fn recovered(&mut self, _recovery: &Recovery) {}
 }
 
-impl<F: FnMut(&EpochReport, &Learner) -> Control> Observer for F {
-    fn epoch(&mut self, report: &EpochReport, learner: &Learner) -> Control {
+impl<F: FnMut(&EpochReport, &Learner) -> ControlFlow<()>> Observer for F {
+    fn epoch(&mut self, report: &EpochReport, learner: &Learner) -> ControlFlow<()> {
         self(report, learner)
     }
 }
 
-/// How a training ended.
+/// How a training ended. Divergence is an outcome and no error: whoever ignores it goes on with a network that never learned.
+#[must_use = "a training may have diverged or been stopped"]
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Outcome {
     /// All epochs are done.
     Finished,
@@ -216,6 +210,24 @@ impl Learner {
         })
     }
 
+    /// Goes on where a checkpoint stands, as if the training had never stopped: to the same bits, for the same data, plan and
+    /// backend.
+    ///
+    /// # Errors
+    /// As [`Learner::new`]; [`Error::Checkpoint`] if the checkpoint is of another optimiser.
+    #[cfg(feature = "checkpoint")]
+    pub fn resume(
+        checkpoint: &crate::checkpoint::Checkpoint,
+        data: &Dataset,
+        plan: Plan,
+        backend: &dyn Backend,
+    ) -> Result<Self> {
+        let network = Network::new(checkpoint.topology.clone(), checkpoint.parameters.clone())?;
+        let mut learner = Self::new(network, checkpoint.initial_states.clone(), data, plan, backend)?;
+        learner.restore(checkpoint.epoch, &checkpoint.optimiser)?;
+        Ok(learner)
+    }
+
     /// Goes on from a checkpoint, of which `new` got the network and the initial states.
     ///
     /// # Errors
@@ -320,7 +332,7 @@ impl Learner {
             if self.state.epoch >= self.plan.epochs {
                 return Outcome::Finished;
             }
-            if control == Control::Stop {
+            if control.is_break() {
                 return Outcome::Stopped;
             }
             self.update();
@@ -423,7 +435,7 @@ impl Learner {
                 let (gradients, initial) = self.batches.gradient_of_all();
                 rule.accumulate(&network.topology, gradients, initial, initial_states);
                 rule.apply(&mut network.parameters, initial_states);
-                if rule.options.adaptive.is_some() {
+                if rule.options.adaptive_rate.is_some() {
                     self.adapt();
                 }
             }
@@ -435,7 +447,7 @@ impl Learner {
     fn adapt(&mut self) {
         let before = self.batches.squared_error();
         let Rule::Momentum(rule) = &self.state.rule else { return };
-        let Some(options) = rule.options.adaptive.clone() else { return };
+        let Some(options) = rule.options.adaptive_rate.clone() else { return };
         for tries_left in (0..options.max_tries).rev() {
             self.evaluated = false;
             self.evaluate();

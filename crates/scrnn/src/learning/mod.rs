@@ -15,7 +15,8 @@ mod state;
 
 pub use divergence::Divergence;
 pub use guard::Recovery;
-pub use learner::{Control, EpochReport, Learner, Observer, Outcome};
+pub use learner::{EpochReport, Learner, Observer, Outcome};
+pub use state::{OptimiserState, StateTensor};
 pub use plan::{Adam, AdaptiveRate, Lbfgs, Momentum, OnDivergence, Optimiser, Plan, PriorStep};
 
 #[cfg(test)]

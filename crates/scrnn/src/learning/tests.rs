@@ -1,5 +1,6 @@
 //! Learning as a whole: it ascends, resumes, rolls back, and does not depend on threads.
 
+use std::ops::ControlFlow;
 use super::*;
 use crate::dataset::{Dataset, Sequence};
 use crate::engine::{Engine, InstructionSet};
@@ -45,7 +46,7 @@ fn run(learner: &mut Learner) -> (Outcome, Vec<f64>) {
     let mut history = Vec::new();
     let outcome = learner.run(&mut |report: &EpochReport, _: &Learner| {
         history.push(report.ln_likelihood);
-        Control::Continue
+        ControlFlow::Continue(())
     });
     (outcome, history)
 }
@@ -58,7 +59,7 @@ fn bits(learner: &Learner) -> Vec<u64> {
 
 #[test]
 fn every_optimiser_ascends() {
-    let adaptive = Momentum { adaptive: Some(AdaptiveRate::default()), ..Momentum::default() };
+    let adaptive = Momentum { adaptive_rate: Some(AdaptiveRate::default()), ..Momentum::default() };
     for plan in
         [momentum(4000, Momentum::default()), momentum(800, adaptive), adam(800), batches(500), refined(adam(100), 1.0)]
     {
@@ -80,7 +81,7 @@ fn a_learner_without_variance_lowers_the_squared_error() {
     let mut reports = Vec::new();
     learner.run(&mut |report: &EpochReport, _: &Learner| {
         reports.push(report.clone());
-        Control::Continue
+        ControlFlow::Continue(())
     });
     let (first, last) = (&reports[0], &reports[1500]);
     assert!(last.mse < 0.05 * first.mse, "{} to {}", first.mse, last.mse);
@@ -92,13 +93,13 @@ fn a_learner_without_variance_lowers_the_squared_error() {
 fn a_single_try_is_judged_and_withdrawn() {
     for max_tries in [1, 2] {
         let adaptive = AdaptiveRate { max_error_ratio: 1.02, max_tries, ..AdaptiveRate::default() };
-        let plan = momentum(300, Momentum { rate: 1.0, adaptive: Some(adaptive), ..Momentum::default() });
+        let plan = momentum(300, Momentum { rate: 1.0, adaptive_rate: Some(adaptive), ..Momentum::default() });
         let mut learner = learner(plan, 1);
         let (mut reports, mut networks) = (Vec::new(), Vec::new());
         let outcome = learner.run(&mut |report: &EpochReport, learner: &Learner| {
             reports.push(report.clone());
             networks.push(bits(learner));
-            Control::Continue
+            ControlFlow::Continue(())
         });
         assert_eq!(outcome, Outcome::Finished);
         let (mut withdrawn, mut lowered) = (0, 0);
@@ -117,7 +118,7 @@ fn a_single_try_is_judged_and_withdrawn() {
 
 #[test]
 fn stopping_and_restoring_goes_on_bit_for_bit() {
-    let adaptive = Momentum { adaptive: Some(AdaptiveRate::default()), ..Momentum::default() };
+    let adaptive = Momentum { adaptive_rate: Some(AdaptiveRate::default()), ..Momentum::default() };
     let narrow = Plan { initial_state_variance: 1e-5, ..momentum(60, Momentum::default()) };
     for plan in [
         momentum(60, Momentum::default()),
@@ -133,8 +134,8 @@ fn stopping_and_restoring_goes_on_bit_for_bit() {
 
         let mut part = learner(plan.clone(), 1);
         let stop_at_23 = |report: &EpochReport, _: &Learner| match report.epoch {
-            23 => Control::Stop,
-            _ => Control::Continue,
+            23 => ControlFlow::Break(()),
+            _ => ControlFlow::Continue(()),
         };
         let mut stop_at_23 = stop_at_23;
         assert_eq!(part.run(&mut stop_at_23), Outcome::Stopped);
@@ -250,7 +251,7 @@ fn a_checkpoint_without_the_pairs_of_lbfgs_or_with_impossible_ones_is_refused() 
     let plan = refined(adam(20), 0.5);
     let mut old = learner(plan.clone(), 1);
     run(&mut old);
-    let take_up = |epoch: u64, state: &crate::checkpoint::OptimiserState| {
+    let take_up = |epoch: u64, state: &crate::learning::OptimiserState| {
         let (network, states) = (old.network().clone(), old.initial_states().clone());
         let mut new = Learner::new(network, states, &waves(3, 60), plan.clone(), &Engine::serial()).unwrap();
         new.restore(epoch, state)
@@ -287,7 +288,7 @@ fn ten_times_the_sequences_take_ten_times_as_long() {
                 if report.epoch + 1 == end {
                     begin = std::time::Instant::now();
                 }
-                if report.epoch < end { Control::Continue } else { Control::Stop }
+                if report.epoch < end { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
             });
             *fastest = fastest.min(begin.elapsed().as_secs_f64());
         }
@@ -313,7 +314,7 @@ fn divergence_is_located_and_rolled_back() {
     let mut last = None;
     let outcome = learner.run(&mut |report: &EpochReport, learner: &Learner| {
         last = Some((report.epoch, bits(learner)));
-        Control::Continue
+        ControlFlow::Continue(())
     });
     let Outcome::Diverged(divergence) = outcome else { panic!("{outcome:?}") };
     let (epoch, good) = last.unwrap();
@@ -373,9 +374,9 @@ struct Watch {
 }
 
 impl Observer for Watch {
-    fn epoch(&mut self, report: &EpochReport, _: &Learner) -> Control {
+    fn epoch(&mut self, report: &EpochReport, _: &Learner) -> ControlFlow<()> {
         self.reports.push(report.clone());
-        if self.stop_at == Some(report.epoch) { Control::Stop } else { Control::Continue }
+        if self.stop_at == Some(report.epoch) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
     fn recovered(&mut self, recovery: &Recovery) {
@@ -387,7 +388,7 @@ impl Observer for Watch {
 fn a_training_that_leaves_its_course_is_brought_back_and_ends_well() {
     for optimiser in [
         Optimiser::Momentum(Momentum { rate: 0.3, ..Momentum::default() }),
-        Optimiser::Momentum(Momentum { rate: 1e4, adaptive: None, ..Momentum::default() }),
+        Optimiser::Momentum(Momentum { rate: 1e4, adaptive_rate: None, ..Momentum::default() }),
         Optimiser::Adam(Adam { rate: 3.0, clip_norm: 0.0, ..Adam::default() }),
     ] {
         let mut learner = learner(guarded(1500, optimiser.clone()), 1);
@@ -468,7 +469,7 @@ fn a_state_without_a_guard_is_taken_up_by_one_and_a_broken_one_is_refused() {
     let plan = guarded(50, Optimiser::Momentum(Momentum::default()));
     let mut old = learner(momentum(20, Momentum::default()), 1);
     run(&mut old);
-    let take_up = |state: &crate::checkpoint::OptimiserState| {
+    let take_up = |state: &crate::learning::OptimiserState| {
         let (network, states) = (old.network().clone(), old.initial_states().clone());
         let mut new = Learner::new(network, states, &waves(3, 60), plan.clone(), &Engine::serial()).unwrap();
         new.restore(20, state).map(|()| run(&mut new).0)

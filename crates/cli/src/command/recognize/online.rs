@@ -159,7 +159,7 @@ impl<'a> Session<'a> {
     fn new(online: &Online, how: &How<'_>, trained: &'a Trained, shared: &Shared) -> Result<Self> {
         let options = online.options(how, trained)?;
         let start = online.start(trained)?;
-        let regression = ErrorRegression::new(&trained.network(), start, options, shared.instruction_set())?;
+        let regression = ErrorRegression::new(&trained.network(), start, options, &shared.engine()?)?;
         let (deadline, scaled) = (how.regression.clock()?, vec![0.0; trained.checkpoint.channels.len()]);
         Ok(Self { trained, regression, deadline, taken: 0, scaled })
     }
