@@ -7,11 +7,10 @@ use std::path::{Path, PathBuf};
 const MAY_USE: [(&str, &[&str]); 8] = [
     ("error.rs", &[]),
     ("streams.rs", &[]),
-    ("parallel.rs", &[]),
     ("robot", &["error"]),
     ("world", &["error", "robot"]),
     ("recording", &["error", "robot", "world"]),
-    ("reach", &["error", "streams", "parallel", "robot", "world", "recording"]),
+    ("reach", &["error", "streams", "robot", "world", "recording"]),
     ("interact", &["error", "streams", "robot", "world", "recording"]),
 ];
 

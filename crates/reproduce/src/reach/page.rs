@@ -8,14 +8,19 @@ use scrnn_sim::touching::{Cycle, HandState};
 use scrnn_sim::tutor::Demonstration;
 
 use super::trials::{Found, Given, decided};
-use super::{Condition, Findings, Material, channel};
+use super::{Driven, Findings, Material, channel};
+use crate::framework::JobResult;
 use scrnn_report::{Block, Chart, Drawing, Figure, Panel, Picture, Pictures, Section, Series, Sheet, Tone, View};
 
 /// Samples of the figures over time: five cycles.
 const SHOWN: usize = 5 * CYCLE;
 
-/// All sections.
-pub fn sections(findings: &Findings, material: &Material) -> Vec<Section> {
+/// All sections: of the first seed, and the drivers of all.
+pub fn sections(jobs: &[JobResult<Findings>], materials: &[Material]) -> Vec<Section> {
+    let (Some(first), Some(material)) = (jobs.first(), materials.first()) else { return Vec::new() };
+    let findings = &first.findings;
+    let mut compared: Vec<Block> = jobs.iter().map(|job| drivers(job, jobs.len() > 1)).collect();
+    compared.push(meaning());
     vec![
         Section {
             title: "Touching".into(),
@@ -23,7 +28,7 @@ pub fn sections(findings: &Findings, material: &Material) -> Vec<Section> {
         },
         Section { title: "Generalisation".into(), blocks: vec![phase_plots(material)] },
         Section { title: "Variance over the cycle".into(), blocks: vec![variance(findings), variance_table(findings)] },
-        Section { title: "Drivers compared".into(), blocks: vec![drivers(findings), meaning()] },
+        Section { title: "Drivers compared".into(), blocks: compared },
     ]
 }
 
@@ -366,12 +371,12 @@ fn variance_table(findings: &Findings) -> Block {
 }
 
 /// The network beside what it is compared with.
-fn drivers(findings: &Findings) -> Block {
+fn drivers(job: &JobResult<Findings>, several: bool) -> Block {
     let share = |found: &[Found]| {
         let all: Vec<&Found> = found.iter().collect();
         if all.is_empty() { "\u{2013}".to_owned() } else { format!("{:.3}", super::trials::pooled_rate(&all)) }
     };
-    let row = |condition: &Condition| {
+    let row = |condition: &Driven| {
         let between = condition.others().get(..2).unwrap_or_default();
         let random = condition.others().get(2..).unwrap_or_default();
         vec![
@@ -384,11 +389,11 @@ fn drivers(findings: &Findings) -> Block {
         ]
     };
     Block::Sheet(Sheet {
-        caption: "Touches per cycle".into(),
+        caption: if several { format!("Touches per cycle, {}", job.called()) } else { "Touches per cycle".into() },
         head: ["driver", "learned positions", "half way", "at random", "all", "spread ratio"]
             .map(String::from)
             .to_vec(),
-        rows: findings.conditions.iter().map(row).collect(),
+        rows: job.findings.conditions.iter().map(row).collect(),
         note: "Without noise nothing but the robot's own motors makes cycles differ; its spread ratio says little."
             .into(),
     })

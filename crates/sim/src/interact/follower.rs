@@ -10,7 +10,7 @@ use scrnn::engine::InstructionSet;
 use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions, Regression};
 use scrnn::network::Network;
 use scrnn::scaling::Scaling;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::interaction::{ARM, CHANNELS, Collision, Interaction, arm_postures};
 use super::order::{branchings, primitive_len};
@@ -65,7 +65,7 @@ pub struct ControlStep {
 }
 
 /// How a branching went.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
     /// The hand went to the object's side.
@@ -79,7 +79,7 @@ pub enum Outcome {
 }
 
 /// One branching.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Branch {
     /// Where the object went.
     pub side: Side,
