@@ -31,6 +31,7 @@ pub fn recognition<'a>(
     seed: u64,
     desk: &Desk<'_>,
 ) -> Result<Vec<(usize, usize)>> {
+    desk.say("recognition, which takes a while");
     let engine = desk.engine();
     let options = RecognitionOptions {
         seed,

@@ -70,13 +70,9 @@ impl<S: Study> Reproduction<'_, S> {
         let path = std::path::absolute(folder.path()).map_err(|error| Failure::disk("find", folder.path(), error))?;
         let conditions = study.conditions(options.beyond);
 
-        let engine = Engine::new(context.threads, context.instruction_set)?;
-        study.prepare(
-            &conditions,
-            &path,
-            &Desk::new(&engine, (context.interrupt, context.messages), self.name, None),
-        )?;
-        drop(engine);
+        let serial = Engine::serial();
+        let desk = Desk::new(&serial, (context.interrupt, context.messages), self.name, None);
+        study.prepare(&conditions, &path, context.threads, &desk)?;
 
         // Conditions take turns, so that whatever is interrupted has networks of each.
         let places: Vec<(usize, u64)> = (0..options.seeds)

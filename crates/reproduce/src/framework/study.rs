@@ -44,8 +44,8 @@ pub trait Study: Sync {
     /// Under which conditions networks learn; with `beyond` also those that the thesis leaves to the future.
     fn conditions(&self, beyond: bool) -> Vec<Condition>;
 
-    /// What has to lie in the folder before anything is trained.
-    fn prepare(&self, _conditions: &[Condition], _folder: &Path, _desk: &Desk<'_>) -> Result<()> {
+    /// What has to lie in the folder before anything is trained, made on so many threads.
+    fn prepare(&self, _conditions: &[Condition], _folder: &Path, _threads: usize, _desk: &Desk<'_>) -> Result<()> {
         Ok(())
     }
 

@@ -110,7 +110,7 @@ impl Setting {
     }
 
     /// Makes its recordings, unless they are there.
-    pub fn record(&self, folder: &Path, seed: u64, desk: &Desk<'_>) -> Result<()> {
+    pub fn record(&self, folder: &Path, seed: u64, threads: usize, desk: &Desk<'_>) -> Result<()> {
         let path = folder.join(self.file());
         if path.exists() {
             return Ok(());
@@ -118,7 +118,6 @@ impl Setting {
         desk.say(&format!("{}: recordings of two robots", self.condition.label));
         let (sequences, steps) = interact::size();
         let begin = |k: usize| desk.at(|| format!("{}: recording {} of {sequences}", self.condition.label, k + 1));
-        let threads = desk.engine().threads();
         let data = match self.left {
             None => interact::make_while((sequences, steps), seed, threads, begin)?.data,
             Some(left) => drawn(left, seed, threads, begin)?,

@@ -53,8 +53,9 @@ impl Study for Interact {
         conditions::ALL.iter().filter(|one| beyond || one.of_thesis).map(|one| one.condition).collect()
     }
 
-    fn prepare(&self, conditions: &[Condition], folder: &Path, desk: &Desk<'_>) -> Result<()> {
-        conditions.iter().try_for_each(|condition| setting(condition.key).record(folder, RECORDINGS, desk))
+    fn prepare(&self, conditions: &[Condition], folder: &Path, threads: usize, desk: &Desk<'_>) -> Result<()> {
+        let record = |condition: &Condition| setting(condition.key).record(folder, RECORDINGS, threads, desk);
+        conditions.iter().try_for_each(record)
     }
 
     fn experiment(

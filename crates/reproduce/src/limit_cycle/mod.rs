@@ -96,6 +96,7 @@ impl Study for LimitCycle {
             ..RecognitionOptions::default()
         };
         let found: Vec<Vec<f64>> = desk.part("recognition", || {
+            desk.say("recognition of new sequences");
             let found = recognize(network, &learned.initial_states, &new.task.data, &options, engine)?;
             Ok(found.into_iter().map(|mut found| found.trials.swap_remove(0).initial_state).collect())
         })?;

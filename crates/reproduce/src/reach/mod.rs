@@ -5,6 +5,7 @@ mod page;
 mod processor_time;
 mod trials;
 mod variance;
+mod variance_page;
 
 use scrnn_sim::agent::{Noise, Performance};
 use scrnn_sim::channels::{REACHING, VISION};
