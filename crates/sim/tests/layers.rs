@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each folder or file with what it may use of the crate.
-const MAY_USE: [(&str, &[&str]); 8] = [
+const MAY_USE: [(&str, &[&str]); 7] = [
     ("error.rs", &[]),
     ("streams.rs", &[]),
     ("robot", &["error"]),
