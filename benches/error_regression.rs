@@ -64,7 +64,12 @@ impl Case {
             ascent: Ascent::Adam { rate: 0.01 },
             ..ErrorRegressionOptions::new(channels)
         };
-        let regression = ErrorRegression::new(&network, states.sequence(0), options, &Engine::new(1, arguments.set).expect("this processor has it"));
+        let regression = ErrorRegression::new(
+            &network,
+            states.sequence(0),
+            options,
+            &Engine::new(1, arguments.set).expect("this processor has it"),
+        );
         let mut regression = regression.expect("options in their range");
         let full = self.window + self.topology.delay();
         let mut seconds = Vec::with_capacity(count);

@@ -1,12 +1,12 @@
 //! What is promised to allocate nothing allocates nothing. (On several threads: `memory.rs`.)
 
-use std::ops::ControlFlow;
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::engine::{Engine, InstructionSet};
 use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions};
 use scrnn::initialization::initialize;
 use scrnn::learning::{Adam, EpochReport, Lbfgs, Learner, Momentum, Optimiser, Plan, PriorStep};
 use scrnn::topology::{Group, Prediction, Topology};
+use std::ops::ControlFlow;
 
 fn wave(steps: usize) -> Vec<f64> {
     (0..2 * steps).map(|k| 0.6 * (0.3 * k as f64).sin()).collect()
@@ -19,7 +19,8 @@ fn a_control_step_of_error_regression_allocates_nothing() {
     let (network, states) = initialize(&topology, 1, 1);
     for set in InstructionSet::available() {
         let options = ErrorRegressionOptions { window: 9, ..ErrorRegressionOptions::new(2) };
-        let mut regression = ErrorRegression::new(&network, states.sequence(0), options, &Engine::new(1, set).unwrap()).unwrap();
+        let mut regression =
+            ErrorRegression::new(&network, states.sequence(0), options, &Engine::new(1, set).unwrap()).unwrap();
         let samples = wave(40);
         let counted = allocation_counter::measure(|| {
             for sample in samples.chunks(2) {
@@ -52,12 +53,12 @@ fn after_the_first_epochs_an_epoch_allocates_nothing() {
         let mut learner = Learner::new(network, states, &data, plan, &Engine::serial()).unwrap();
         // Counting begins and ends inside of the training, where the observer stands.
         let mut epochs = 0;
-        learner.run(&mut |_: &EpochReport, _: &Learner| {
+        let _ = learner.run(&mut |_: &EpochReport, _: &Learner| {
             epochs += 1;
             if epochs < 3 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
         let counted = allocation_counter::measure(|| {
-            learner.run(&mut |_: &EpochReport, _: &Learner| {
+            let _ = learner.run(&mut |_: &EpochReport, _: &Learner| {
                 epochs += 1;
                 if epochs < 15 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
             });

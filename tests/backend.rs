@@ -1,6 +1,5 @@
 //! Another way to compute, put in from outside: plain loops and differences in place of the engine.
 
-use std::ops::ControlFlow;
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::engine::Engine;
 use scrnn::error::Result;
@@ -12,6 +11,7 @@ use scrnn::objective::{Backend, Evaluation, Objective, Request, Run, Want};
 use scrnn::parameters::Parameters;
 use scrnn::recognition::{RecognitionOptions, recognize};
 use scrnn::topology::Topology;
+use std::ops::ControlFlow;
 
 /// Counts nothing, remembers nothing, and is slow.
 struct Differences;
@@ -26,7 +26,8 @@ impl Backend for Differences {
     fn objective(&self, request: &Request<'_>) -> Result<Box<dyn Objective>> {
         request.data.check_for(request.topology)?;
         let topology = request.topology.clone();
-        let network = Network { parameters: Parameters::zeros(&topology), topology };
+        let parameters = Parameters::zeros(&topology);
+        let network = Network::new(topology, parameters)?;
         Ok(Box::new(ByDifferences { network, data: request.data.clone() }))
     }
 }
@@ -45,12 +46,12 @@ impl ByDifferences {
 
 impl Objective for ByDifferences {
     fn set_parameters(&mut self, parameters: &Parameters) {
-        self.network.parameters = parameters.clone();
+        self.network.parameters_mut().copy_from_slice(parameters.as_slice());
     }
 
     fn evaluate(&mut self, runs: &[Run], initial: &[f64], want: Want, evaluation: &mut Evaluation) {
         evaluation.resize(runs.len());
-        let units = self.network.topology.context_units();
+        let units = self.network.topology().context_units();
         let starts = || runs.iter().zip(initial.chunks_exact(units));
         for (index, (run, u0)) in starts().enumerate() {
             (evaluation.ln_likelihood[index], evaluation.squared_error[index]) = self.score(*run, u0);
@@ -65,13 +66,13 @@ impl Objective for ByDifferences {
             }
         }
         if want == Want::Everything {
-            for k in 0..self.network.parameters.as_slice().len() {
-                let at = self.network.parameters.as_slice()[k];
+            for k in 0..self.network.parameters().as_slice().len() {
+                let at = self.network.parameters().as_slice()[k];
                 let all = slope(|h| {
-                    self.network.parameters.as_mut_slice()[k] = at + h;
+                    self.network.parameters_mut()[k] = at + h;
                     starts().map(|(run, u0)| self.score(*run, u0).0).sum()
                 });
-                self.network.parameters.as_mut_slice()[k] = at;
+                self.network.parameters_mut()[k] = at;
                 evaluation.gradients.as_mut_slice()[k] = all;
             }
         }

@@ -1,7 +1,7 @@
 //! Learning as the thesis prescribes it: the rules of ascent step by step, and the shipped experiments on the sine wave.
 
-use std::ops::ControlFlow;
 use std::f64::consts::TAU;
+use std::ops::ControlFlow;
 
 use assert_cmd::Command;
 use scrnn::dataset::{Dataset, Sequence};

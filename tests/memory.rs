@@ -1,8 +1,8 @@
 //! The memory of a training, of all threads together: as much as docs/performance.md says, and no more of it after the first
 //! epochs.
 
-use std::ops::ControlFlow;
 use std::alloc::System;
+use std::ops::ControlFlow;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use scrnn::dataset::{Dataset, Sequence};

@@ -20,7 +20,7 @@ fn columns_in_another_order_give_the_same_bits_and_other_names_are_refused() {
     let place = Place::with(&experiment("files = [\"arm.csv\"]"));
     place.write("arm.csv", table(["shoulder", "elbow"], [0, 1]));
     place.write("swapped.csv", table(["shoulder", "elbow"], [1, 0]));
-    place.write("nameless.csv", table(["shoulder", "elbow"], [0, 1]).split_once('\n').unwrap().1.to_owned());
+    place.write("nameless.csv", table(["shoulder", "elbow"], [0, 1]).split_once('\n').unwrap().1);
     place.write("others.csv", table(["knee", "hip"], [0, 1]));
     place.ok("train sine.toml --out run");
     for command in ["recognize run FILE --starts 2 --epochs 5 --json", "generate run --mode open --data FILE --json"] {

@@ -10,7 +10,7 @@ pub fn listen() -> Interrupt {
         if wish.ask() {
             std::process::exit(130);
         }
-        eprintln!("\nfinishing the epoch; once more ends at once");
+        eprintln!("\nfinishing the epoch, or the sample of an evaluation; once more ends at once");
     };
     if let Err(error) = ctrlc::set_handler(handler) {
         // Then Ctrl-C just kills, and the last checkpoint remains.

@@ -28,13 +28,13 @@ const SAMPLES: usize = 300;
 pub fn page(trained: &Trained, data: &Dataset, rows: &[Row], seed: u64, engine: &Engine) -> Result<Page> {
     let (checkpoint, network) = (&trained.checkpoint, trained.network());
     let scaled = checkpoint.scaling.apply(data);
-    let (n, delay) = (scaled.channels().len(), network.topology.delay());
+    let (n, delay) = (scaled.channels().len(), network.topology().delay());
     let initial_states = &checkpoint.initial_states;
     let states: Vec<&[f64]> = (0..initial_states.sequences()).map(|s| initial_states.sequence(s)).collect();
     let open = assessment::open_loop(&network, &states, &scaled, engine)?;
     let options = GenerationOptions {
         steps: assessment::longest(&scaled, delay),
-        feedback: Feedback::closed(n, network.topology.has_variance()),
+        feedback: Feedback::closed(n, network.topology().has_variance()),
         seed,
         contexts: false,
     };
@@ -57,7 +57,7 @@ pub fn page(trained: &Trained, data: &Dataset, rows: &[Row], seed: u64, engine: 
         data.sequences().len(),
         if n == 1 { "one channel".to_owned() } else { format!("{n} channels") },
         data.channels().join(", "),
-        network.topology.context_units(),
+        network.topology().context_units(),
         checkpoint.epoch,
         if delay == 1 { "one step".to_owned() } else { format!("{delay} steps") },
     );

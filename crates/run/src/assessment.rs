@@ -72,7 +72,7 @@ pub fn longest(data: &Dataset, delay: usize) -> usize {
 
 /// One step ahead of each sample (2.25a).
 pub fn open_loop(network: &Network, states: &[&[f64]], data: &Dataset, engine: &Engine) -> Result<Vec<Generated>> {
-    let steps = longest(data, network.topology.delay());
+    let steps = longest(data, network.topology().delay());
     let feedback = Feedback::open(data.channels().len());
     run(network, states, data, &GenerationOptions { steps, feedback, seed: 1, contexts: false }, engine)
 }

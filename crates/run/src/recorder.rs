@@ -95,7 +95,7 @@ impl<'a> Recorder<'a> {
         let Some(best) = self.notes.best else { return };
         if let Ok(file) = read_checkpoint(&self.run.file(BEST))
             && file.epoch == best.epoch
-            && file.topology == learner.network().topology
+            && file.topology == *learner.network().topology()
             && file.sequences == self.record.sequences
         {
             self.best = Some((file.parameters, file.initial_states));
@@ -116,7 +116,7 @@ impl<'a> Recorder<'a> {
         }
         let notes = Notes { score: self.score_of(learner.epoch()), ..self.notes.clone() };
         let state = (learner.epoch(), learner.optimiser_state());
-        let newest = self.checkpoint(learner, &learner.network().parameters, learner.initial_states(), state, &notes);
+        let newest = self.checkpoint(learner, learner.network().parameters(), learner.initial_states(), state, &notes);
         // Never replace a good file by one that could not be read back.
         newest.check()?;
         self.run.write(CHECKPOINT, &newest.to_bytes())?;
@@ -168,7 +168,7 @@ impl<'a> Recorder<'a> {
         notes: &Notes,
     ) -> Checkpoint {
         Checkpoint {
-            topology: learner.network().topology.clone(),
+            topology: learner.network().topology().clone(),
             parameters: parameters.clone(),
             initial_states: initial_states.clone(),
             scaling: self.record.scaling.clone(),
@@ -188,7 +188,7 @@ impl<'a> Recorder<'a> {
         }
         self.notes.best = Some(score);
         self.best_waits = true;
-        let (parameters, initial_states) = (&learner.network().parameters, learner.initial_states());
+        let (parameters, initial_states) = (learner.network().parameters(), learner.initial_states());
         match &mut self.best {
             Some((best, states)) => {
                 best.as_mut_slice().copy_from_slice(parameters.as_slice());

@@ -27,6 +27,7 @@ pub struct Trained {
     pub checkpoint: Checkpoint,
     /// The program's own notes, unless something else wrote the checkpoint.
     pub notes: Option<Notes>,
+    network: Network,
 }
 
 impl Trained {
@@ -49,13 +50,13 @@ impl Trained {
         };
         let checkpoint = read_checkpoint(&file)?;
         let notes = Notes::of(&checkpoint);
-        Ok(Self { path: file, checkpoint, notes })
+        let network = Network::new(checkpoint.topology.clone(), checkpoint.parameters.clone())?;
+        Ok(Self { path: file, checkpoint, notes, network })
     }
 
     /// The network itself.
     pub fn network(&self) -> Network {
-        let Checkpoint { topology, parameters, .. } = &self.checkpoint;
-        Network { topology: topology.clone(), parameters: parameters.clone() }
+        self.network.clone()
     }
 
     /// Which part of its files it learned, where that is known.

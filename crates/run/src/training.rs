@@ -2,12 +2,10 @@
 
 use std::path::Path;
 
-use scrnn::checkpoint::Checkpoint;
 use scrnn::dataset::Dataset;
 use scrnn::engine::Engine;
 use scrnn::initialization::initialize;
 use scrnn::learning::{Learner, Outcome};
-use scrnn::network::Network;
 use scrnn::scaling::Scaling;
 use scrnn::topology::Topology;
 
@@ -97,7 +95,7 @@ pub fn train(
     let (notes, history) = if found && wanted == Found::GoOn {
         let checkpoint = read_checkpoint(&run.file(CHECKPOINT))?;
         let notes = resume::check(&checkpoint, notes, experiment, path)?;
-        learner = go_on(checkpoint, &scaled, experiment, engine)?;
+        learner = Learner::resume(&checkpoint, &scaled, experiment.plan(), engine)?;
         messages.say(&format!("going on with {} at epoch {}", path.display(), learner.epoch()));
         write_experiment(&run, experiment)?;
         (notes, History::go_on(&run, learner.epoch())?)
@@ -159,15 +157,6 @@ fn refuse_unbounded(data: &Dataset, topology: &Topology) -> Result<()> {
         format!("{what}: without noise its likelihood has no bound, and its variance would fall until numbers end"),
         "leave it out with `channels` in [data], or set `variance_floor` in [network], e.g. to 1e-4",
     ))
-}
-
-/// A learner that stands where the checkpoint stands.
-fn go_on(checkpoint: Checkpoint, scaled: &Dataset, experiment: &Experiment, engine: &Engine) -> Result<Learner> {
-    let Checkpoint { topology, parameters, initial_states, epoch, optimiser, .. } = checkpoint;
-    let network = Network { topology, parameters };
-    let mut learner = Learner::new(network, initial_states, scaled, experiment.plan(), engine)?;
-    learner.restore(epoch, &optimiser)?;
-    Ok(learner)
 }
 
 fn write_experiment(run: &RunFolder, experiment: &Experiment) -> Result<()> {

@@ -48,7 +48,7 @@ pub fn compare(
 ) -> Result<Option<Comparison>> {
     let scaled = scaling.apply(data);
     let n = scaled.channels().len();
-    let delay = network.topology.delay();
+    let delay = network.topology().delay();
     let steps = scaled.sequences().iter().map(|sequence| sequence.len() - delay).max().unwrap_or(0);
     let starts: Vec<Start<'_>> = scaled
         .sequences()

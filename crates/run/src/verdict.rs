@@ -58,7 +58,7 @@ impl Verdict {
     /// Judges the network that the training ended with.
     pub fn new(training: &Training, engine: &Engine) -> Result<Self> {
         let Training { run, outcome, learner, source, scaling, score, best, seconds } = training;
-        let topology = &learner.network().topology;
+        let topology = &learner.network().topology();
         let truth = match (outcome, &source.truth) {
             (Outcome::Finished, Some(truth)) if topology.has_variance() => {
                 truth::compare((learner.network(), learner.initial_states()), (&source.data, truth, scaling), engine)?
@@ -71,6 +71,7 @@ impl Verdict {
                 Outcome::Finished => "finished",
                 Outcome::Stopped => "interrupted",
                 Outcome::Diverged(_) => "diverged",
+                _ => "ended",
             },
             epoch: learner.epoch(),
             nll: score.and_then(|score| score.nll),

@@ -106,7 +106,8 @@ fn the_gradient_at_the_tail_agrees_with_central_differences() {
             ..ErrorRegressionOptions::new(3)
         };
         for set in InstructionSet::available() {
-            let mut regression = ErrorRegression::new(&network, &u0(&network), options.clone(), &Engine::new(1, set).unwrap()).unwrap();
+            let mut regression =
+                ErrorRegression::new(&network, &u0(&network), options.clone(), &Engine::new(1, set).unwrap()).unwrap();
             observe_all(&mut regression, count);
             let (steps, tail) = (regression.window(), regression.tail().to_vec());
             assert_eq!(steps, 12.min(count - delay));

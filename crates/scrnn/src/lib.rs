@@ -86,6 +86,7 @@
 //! | [`initial_states`], [`initialization`] | u_0 of each sequence and their mean; random starting values | 2.6.1, 2.7 |
 //! | [`dataset`], [`scaling`] | sequences, and their way into the network's range | 2.6.1, 4.2 |
 //! | [`kernels`], [`engine`] | products, tanh and exp in SIMD; instruction set and threads | |
+//! | [`jobs`] | whole trainings or simulations side by side on the cores | |
 //! | [`forward`], [`likelihood`] | the dynamics and their score, each with a plain reference | 2.5, 2.6 |
 //! | [`objective`] | the seam: what is climbed, and who computes it | 2.6 |
 //! | [`learning`] | momentum ascent, its adaptive rate, Adam; the loop with its observer | 2.6.2, D.1 |
@@ -118,6 +119,7 @@ pub mod forward;
 pub mod generation;
 pub mod initial_states;
 pub mod initialization;
+pub mod jobs;
 #[doc(hidden)]
 pub mod kernels;
 pub mod learning;

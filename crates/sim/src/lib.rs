@@ -14,7 +14,6 @@
 
 pub mod error;
 pub mod interact;
-pub mod parallel;
 pub mod reach;
 pub mod recording;
 pub mod robot;

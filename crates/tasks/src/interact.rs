@@ -2,10 +2,10 @@
 
 use scrnn::analysis::excursions::Side;
 use scrnn::dataset::{Dataset, Sequence};
+use scrnn::jobs::side_by_side;
 use scrnn_sim::error::{Error, Result};
 use scrnn_sim::film::Film;
 use scrnn_sim::interaction::{CHANNELS, InteractionOptions, SensorNoise, all_orders, letters, record, samples};
-use scrnn_sim::parallel::in_parallel;
 use scrnn_sim::recording::RecordingError;
 
 use crate::Task;
@@ -24,37 +24,53 @@ fn seed_of(seed: u64, k: usize) -> u64 {
 }
 
 /// The first orders, each with so many of its samples; a simulation for each of them, side by side on the cores.
-pub fn make((sequences, steps): (usize, usize), seed: u64, threads: usize) -> Result<Task> {
+///
+/// # Errors
+/// [`Error::Setting`] for a size that there is not.
+pub fn make(size: (usize, usize), seed: u64, threads: usize) -> Result<Task> {
+    make_while(size, seed, threads, |_| Ok(()))
+}
+
+/// The same; `begin` is told the number of each order before it is recorded, and ends everything by failing.
+///
+/// # Errors
+/// As [`make`], and those of `begin`.
+pub fn make_while<E: From<Error> + Send>(
+    (sequences, steps): (usize, usize),
+    seed: u64,
+    threads: usize,
+    begin: impl Fn(usize) -> std::result::Result<(), E> + Sync,
+) -> std::result::Result<Task, E> {
     let (orders, longest) = size();
     if sequences == 0 || sequences > orders || steps == 0 || steps > longest {
-        return Err(Error::Setting {
-            what: "the size of the task interact",
-            found: format!("{sequences} sequences of {steps} samples"),
-            needed: "1 to 32 sequences of 1 to 470 samples",
-        });
+        let found = format!("{sequences} sequences of {steps} samples");
+        let needed = "1 to 32 sequences of 1 to 470 samples";
+        return Err(Error::Setting { what: "the size of the task interact", found, needed }.into());
     }
     let orders = &all_orders(BRANCHES)[..sequences];
     let options = InteractionOptions::default();
     let quiet = SensorNoise([0.0; CHANNELS.len()]);
-    let both = recorded(orders, seed, steps, threads)?;
+    let one = |k: usize, _threads: usize| -> std::result::Result<_, E> {
+        begin(k)?;
+        Ok(recorded(&orders[k], seed_of(seed, k), steps)?)
+    };
+    let both = side_by_side(sequences, threads, one)?;
     let (data, means): (Vec<Sequence>, Vec<Sequence>) = both.into_iter().unzip();
     let channels = || CHANNELS.map(String::from).to_vec();
-    let means = Dataset::new(channels(), means)?;
+    let means = Dataset::new(channels(), means).map_err(Error::from)?;
     debug_assert_ne!(options.noise, quiet);
     let variances = means.map(|channel, _| options.noise.0[channel].powi(2));
-    Ok(Task { data: Dataset::new(channels(), data)?, means, variances })
+    let data = Dataset::new(channels(), data).map_err(Error::from)?;
+    Ok(Task { data, means, variances })
 }
 
-/// Each order as the sensors gave it, and without their noise.
-fn recorded(orders: &[Vec<Side>], seed: u64, steps: usize, threads: usize) -> Result<Vec<(Sequence, Sequence)>> {
-    let one = |k: usize, order: &[Side]| -> Result<(Sequence, Sequence)> {
-        let mut truth = Vec::new();
-        let noisy = record(order, &InteractionOptions::default(), seed_of(seed, k), steps, |interaction, _| {
-            truth.extend(interaction.truth());
-        })?;
-        Ok((noisy, Sequence::new(letters(order), CHANNELS.len(), truth)?))
-    };
-    in_parallel(orders.len(), threads, |k| one(k, &orders[k]))
+/// An order as the sensors gave it, and without their noise.
+fn recorded(order: &[Side], seed: u64, steps: usize) -> Result<(Sequence, Sequence)> {
+    let mut truth = Vec::new();
+    let noisy = record(order, &InteractionOptions::default(), seed, steps, |interaction, _| {
+        truth.extend(interaction.truth());
+    })?;
+    Ok((noisy, Sequence::new(letters(order), CHANNELS.len(), truth)?))
 }
 
 /// A recording of the first orders, as the bytes of an MCAP file.

@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use scrnn_reproduce::{self as reproduce, Context, Options};
+use scrnn_reproduce::{self as reproduce, Context, Experiment, Options, STUDIES};
 use scrnn_run::experiment::Override;
 use scrnn_run::failure::{Ending, Result};
 
@@ -16,8 +17,8 @@ use crate::signals;
 ///
 /// Makes the data, trains, generates, recognises and evaluates. The folder receives report.html, one page that needs
 /// nothing else; metrics.json, all numbers; figures/, each figure as SVG with its numbers as CSV; and a run folder for
-/// each training, as `scrnn train` writes it. Trainings that are finished are not repeated, and one that was interrupted
-/// goes on.
+/// each training, as `scrnn train` writes it. Trainings that are finished are not repeated, nor are parts of evaluations,
+/// and what was interrupted goes on.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -27,7 +28,8 @@ Examples:
   scrnn reproduce interact --networks 10                 20 networks, in two robots' world and out of it")]
 pub struct Arguments {
     /// Which experiment
-    experiment: Name,
+    #[arg(value_parser = experiments())]
+    experiment: &'static Experiment,
     /// Which settings
     #[arg(long, value_enum, default_value_t = Preset::Fast)]
     preset: Preset,
@@ -50,42 +52,12 @@ pub struct Arguments {
     /// With `interact`: also initial-state variances between the thesis' two, and branchings with a bias (5.4.3)
     #[arg(long)]
     beyond: bool,
-    /// Train anew what is in the folder already
+    /// Train and evaluate anew what is in the folder already
     #[arg(long)]
     overwrite: bool,
     /// Print metrics.json
     #[arg(long)]
     json: bool,
-}
-
-/// The thesis' experiments.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Name {
-    /// Twelve Lissajous curves, each with noise of its own (3.2)
-    Lissajous,
-    /// 144 patterns in one network (6.2.3)
-    Patterns,
-    /// A sine wave whose noise changes over time (3.3)
-    Sinusoid,
-    /// An oscillator that is driven by noise which depends on its state (3.4)
-    LimitCycle,
-    /// NAO learns to touch a sphere from demonstrations, in simulation (4)
-    Reach,
-    /// Two robots interact: reactive and proactive behaviour, and error regression (5)
-    Interact,
-}
-
-impl From<Name> for reproduce::Name {
-    fn from(name: Name) -> Self {
-        match name {
-            Name::Lissajous => Self::Lissajous,
-            Name::Patterns => Self::Patterns,
-            Name::Sinusoid => Self::Sinusoid,
-            Name::LimitCycle => Self::LimitCycle,
-            Name::Reach => Self::Reach,
-            Name::Interact => Self::Interact,
-        }
-    }
 }
 
 /// Which settings.
@@ -106,6 +78,12 @@ impl From<Preset> for reproduce::Preset {
     }
 }
 
+/// One of the thesis' experiments by its word.
+fn experiments() -> impl TypedValueParser<Value = &'static Experiment> {
+    let words = STUDIES.iter().map(|study| PossibleValue::new(study.word).help(study.about));
+    PossibleValuesParser::new(words).map(|word| STUDIES.iter().find(|study| study.word == word).unwrap_or(&STUDIES[0]))
+}
+
 /// Reproduces.
 pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     let interrupt = signals::listen();
@@ -118,7 +96,6 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         progress: &|label, epochs| bars.bar(label, epochs),
     };
     let options = Options {
-        experiment: arguments.experiment.into(),
         preset: arguments.preset.into(),
         seeds: arguments.seeds,
         seed: arguments.seed,
@@ -128,7 +105,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         beyond: arguments.beyond,
         overwrite: arguments.overwrite,
     };
-    let reproduced = reproduce::run(&options, &context)?;
+    let reproduced = arguments.experiment.run(&options, &context)?;
     output::print(if arguments.json { &reproduced.json } else { &reproduced.text })?;
     Ok(reproduced.ending)
 }

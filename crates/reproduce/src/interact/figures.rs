@@ -9,8 +9,8 @@ use scrnn_sim::interaction::branchings;
 
 use super::trials::Subject;
 use super::world::{SHOWN, Snapshot};
+use crate::framework::Result;
 use scrnn_report::{Chart, Figure, Panel, Series, Tone};
-use scrnn_run::failure::Result;
 use scrnn_tasks::interact::BRANCHES;
 
 /// Channels that the thesis draws: the object's column, the head's yaw, the shoulder's pitch, the elbow's yaw.
@@ -44,11 +44,12 @@ impl Material {
     /// Runs what is drawn.
     pub fn of(condition: &'static str, subject: &Subject<'_>) -> Result<Self> {
         let shown = subject.data.sequences().iter().position(|one| one.name == SHOWN).unwrap_or(0);
+        subject.desk.at(|| "what is drawn".to_owned())?;
         let closed = subject.on_its_own(|s| s, subject.seed, true)?.swap_remove(shown);
         let state = subject.states.sequence(subject.other());
         let options = ErrorRegressionOptions::new(subject.data.channels().len());
         let quiet = ErrorRegressionOptions { iterations: 0, ..options.clone() };
-        let topology = &subject.network.topology;
+        let topology = &subject.network.topology();
         let learned: Vec<bool> = topology.per_unit(|group| group.learns_initial_state).collect();
         let places = |slow: bool| (0..learned.len()).filter(|&i| learned[i] == slow).collect::<Vec<_>>();
         let slow = places(true);
@@ -127,7 +128,7 @@ fn figure(
 }
 
 /// Fig. 5.3.
-pub fn initial_states(materials: &[Material]) -> Figure {
+pub fn initial_states(materials: &[&Material]) -> Figure {
     let panels = materials.iter().map(|material| {
         let dimensions = material.states.len() / material.names.len();
         let plane = PrincipalComponents::of(&material.states, dimensions).first(2);
@@ -160,7 +161,7 @@ pub fn initial_states(materials: &[Material]) -> Figure {
 }
 
 /// Fig. 5.5.
-pub fn on_its_own(materials: &[Material]) -> Figure {
+pub fn on_its_own(materials: &[&Material]) -> Figure {
     let (until, n) = (samples(), 8);
     let mut rows: [Vec<Panel>; 5] = Default::default();
     for material in materials {
@@ -231,9 +232,9 @@ fn in_rows(columns: Vec<Vec<Panel>>) -> Vec<Panel> {
 }
 
 /// Fig. 5.6.
-pub fn in_world(materials: &[Material]) -> Figure {
+pub fn in_world(materials: &[&Material]) -> Figure {
     let column =
-        |material: &Material| world_panels(&format!("{}: predicted", material.condition), material, &material.world);
+        |material: &&Material| world_panels(&format!("{}: predicted", material.condition), material, &material.world);
     figure(
         "in-the-world",
         "In the world, without error regression",
@@ -248,8 +249,8 @@ pub fn in_world(materials: &[Material]) -> Figure {
 }
 
 /// Fig. 5.9.
-pub fn regressed(materials: &[Material]) -> Option<Figure> {
-    let (material, (followed, _)) = materials.iter().find_map(|one| Some((one, one.regressed.as_ref()?)))?;
+pub fn regressed(materials: &[&Material]) -> Option<Figure> {
+    let (material, (followed, _)) = materials.iter().find_map(|&one| Some((one, one.regressed.as_ref()?)))?;
     Some(figure(
         "regressed",
         "In the world, with error regression",
@@ -273,8 +274,8 @@ fn modification(snapshots: &[Snapshot]) -> Option<usize> {
 }
 
 /// Fig. 5.10.
-pub fn window(materials: &[Material]) -> Option<Figure> {
-    let (material, (followed, snapshots)) = materials.iter().find_map(|one| Some((one, one.regressed.as_ref()?)))?;
+pub fn window(materials: &[&Material]) -> Option<Figure> {
+    let (material, (followed, snapshots)) = materials.iter().find_map(|&one| Some((one, one.regressed.as_ref()?)))?;
     let centre = modification(snapshots)?;
     let (from, to) = (centre - AROUND.0, centre + AROUND.1);
     let mut columns = Vec::new();

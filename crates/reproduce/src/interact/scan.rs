@@ -2,10 +2,9 @@
 
 use scrnn::error_regression::{Ascent, ErrorRegressionOptions};
 use scrnn::evaluation::mean_and_deviation;
-use serde::Serialize;
 
 use super::trials::Subject;
-use scrnn_run::failure::Result;
+use crate::framework::{Cell, Column, Result, Table};
 
 /// Of the 32 recordings, every how many-th is taken: all settings have to be run on all networks.
 const EVERY: usize = 4;
@@ -17,27 +16,6 @@ pub struct Setting {
     pub name: String,
     /// The options.
     pub options: ErrorRegressionOptions,
-}
-
-/// A setting on all networks.
-#[derive(Debug, Clone, Serialize)]
-pub struct Scanned {
-    /// Which.
-    pub setting: String,
-    /// W.
-    pub window: usize,
-    /// Updates for each sample.
-    pub iterations: usize,
-    /// Mean reaction time over networks.
-    pub mean: f64,
-    /// Its standard deviation.
-    pub deviation: f64,
-    /// That of the slowest network.
-    pub worst: f64,
-    /// Each network's.
-    pub values: Vec<f64>,
-    /// Median milliseconds of a control step.
-    pub milliseconds: f64,
 }
 
 /// What is tried: the default, and departures from it in one way each.
@@ -83,32 +61,50 @@ pub fn settings(channels: usize) -> Vec<Setting> {
     ]
 }
 
-/// One network's mean reaction time and median milliseconds for each setting.
-pub fn one(subject: &Subject<'_>, state: &[f64]) -> Result<Vec<(f64, f64)>> {
-    let settings = settings(subject.data.channels().len());
-    let run = |setting: &Setting| {
-        let found = subject.regressed(state, &subject.regression(setting.options.clone()), EVERY)?;
-        Ok((found.reactions.mean, found.milliseconds[0]))
+/// One network's mean reaction time and median milliseconds for each of the first `most` settings.
+pub fn one(subject: &Subject<'_>, state: &[f64], most: usize) -> Result<Vec<(f64, f64)>> {
+    let run = |setting: Setting| {
+        let name = format!("scan, {}", setting.name);
+        subject.desk.part(&name, || {
+            let found = subject.regressed(&name, state, &subject.regression(setting.options), EVERY)?;
+            Ok((found.reactions.mean, found.milliseconds[0]))
+        })
     };
-    settings.iter().map(run).collect()
+    settings(subject.data.channels().len()).into_iter().take(most).map(run).collect()
 }
 
-/// All networks together.
-pub fn all(channels: usize, networks: &[&Vec<(f64, f64)>]) -> Vec<Scanned> {
-    let together = |(k, setting): (usize, Setting)| {
-        let values: Vec<f64> = networks.iter().map(|network| network[k].0).collect();
-        let times: Vec<f64> = networks.iter().map(|network| network[k].1).collect();
+/// All networks together; none where no network was scanned.
+pub fn table(channels: usize, networks: &[&[(f64, f64)]]) -> Option<Table> {
+    let column = |key, label, digits| Column { key, label, digits };
+    let row = |(k, setting): (usize, Setting)| {
+        let values: Vec<f64> = networks.iter().filter_map(|network| network.get(k)).map(|found| found.0).collect();
+        let times: Vec<f64> = networks.iter().filter_map(|network| network.get(k)).map(|found| found.1).collect();
         let (mean, deviation) = mean_and_deviation(&values);
-        Scanned {
-            setting: setting.name,
-            window: setting.options.window,
-            iterations: setting.options.iterations,
-            mean,
-            deviation,
-            worst: values.iter().copied().fold(0.0, f64::max),
-            milliseconds: mean_and_deviation(&times).0,
-            values,
-        }
+        vec![
+            Cell::Text(setting.name),
+            Cell::Count(setting.options.window as u64),
+            Cell::Count(setting.options.iterations as u64),
+            Cell::Number(mean),
+            Cell::Number(deviation),
+            Cell::Number(values.iter().copied().fold(0.0, f64::max)),
+            Cell::Number(mean_and_deviation(&times).0),
+            Cell::Numbers(values),
+        ]
     };
-    settings(channels).into_iter().enumerate().map(together).collect()
+    (!networks.is_empty()).then(|| Table {
+        key: "scan",
+        caption: "Which settings are safe for all networks?",
+        columns: vec![
+            column("setting", "setting", 0),
+            column("window", "window", 0),
+            column("iterations", "steps", 0),
+            column("mean", "mean", 2),
+            column("deviation", "sd", 2),
+            column("worst", "slowest network", 2),
+            column("milliseconds", "ms", 3),
+            column("values", "each network", 1),
+        ],
+        rows: settings(channels).into_iter().enumerate().map(row).collect(),
+        note: "Mean reaction times over 8 of the 32 recordings, all from the state of LLRRL. ms: median time of a control step.",
+    })
 }

@@ -6,7 +6,6 @@ use scrnn::analysis::cycle::CycleProfile;
 use scrnn::analysis::excursions::{Levels, order};
 use scrnn::analysis::reaction::{ReactionRule, arm_error};
 use scrnn::dataset::Dataset;
-use scrnn::engine::Engine;
 use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions};
 use scrnn::evaluation::mean_and_deviation;
 use scrnn::generation::{Feedback, Generated, GenerationOptions, Start, generate};
@@ -14,10 +13,10 @@ use scrnn::initial_states::InitialStates;
 use scrnn::network::Network;
 use scrnn::scaling::Scaling;
 use scrnn_sim::interaction::{ARM, arm_postures, branchings, primitive_len};
-use serde::Serialize;
-
-use scrnn_run::failure::Result;
 use scrnn_tasks::interact::BRANCHES;
+use serde::{Deserialize, Serialize};
+
+use crate::framework::{Desk, Result};
 
 /// The order whose state stands for one that does not correspond (5.3.3).
 pub const OTHER: &str = "LLRRL";
@@ -41,12 +40,12 @@ pub struct Subject<'a> {
     pub data: &'a Dataset,
     /// Seed of noise.
     pub seed: u64,
-    /// Where to compute.
-    pub engine: &'a Engine,
+    /// Where to compute, and whether to go on.
+    pub desk: &'a Desk<'a>,
 }
 
 /// The network on its own.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ClosedLoop {
     /// How many orders come from their own initial state.
     pub regenerated: usize,
@@ -64,7 +63,7 @@ pub struct ClosedLoop {
 }
 
 /// Where a profile is largest.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Peak {
     /// Steps after the branching.
     pub steps: usize,
@@ -73,7 +72,7 @@ pub struct Peak {
 }
 
 /// Reaction times to all branchings.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Reactions {
     /// Over all branchings.
     pub mean: f64,
@@ -86,7 +85,7 @@ pub struct Reactions {
 }
 
 /// Error regression over all recordings.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Regressed {
     /// y_t as it stood one step before, after the regression on targets up to t - 1.
     pub reactions: Reactions,
@@ -112,7 +111,7 @@ impl Subject<'_> {
     /// Runs with the network's own noise (2.25b), a bit longer than the data.
     pub fn on_its_own(&self, state: impl Fn(usize) -> usize, seed: u64, contexts: bool) -> Result<Vec<Generated>> {
         let n = self.data.channels().len();
-        let known = self.network.topology.delay() * n;
+        let known = self.network.topology().delay() * n;
         let starts: Vec<Start<'_>> = (0..self.data.sequences().len())
             .map(|s| Start {
                 initial_state: self.states.sequence(state(s)),
@@ -122,7 +121,7 @@ impl Subject<'_> {
         let longest = self.data.sequences().iter().map(|sequence| sequence.len()).max().unwrap_or(0);
         let steps = (PATIENCE * longest as f64) as usize;
         let options = GenerationOptions { steps, feedback: Feedback::closed(n, true), seed, contexts };
-        Ok(generate(self.network, &starts, &options, self.engine)?)
+        Ok(generate(self.network, &starts, &options, self.desk.engine())?)
     }
 
     /// The first five sides that the arm goes to.
@@ -136,6 +135,7 @@ impl Subject<'_> {
     /// 5.3.1.
     pub fn closed_loop(&self) -> Result<ClosedLoop> {
         let own = self.on_its_own(|s| s, self.seed ^ OWN_STATES, false)?;
+        self.desk.go_on()?;
         let other = self.other();
         let from_one = self.on_its_own(|_| other, self.seed ^ ONE_STATE, false)?;
         let read = |list: &[Generated]| list.iter().map(|one| self.order_of(one)).collect::<Vec<_>>();
@@ -161,7 +161,7 @@ impl Subject<'_> {
     /// Mean predicted variance of all channels for each sample; 0 for those before the first prediction.
     fn variances(&self, generated: &Generated) -> Vec<f64> {
         let n = self.data.channels().len();
-        let mut means = vec![0.0; self.network.topology.delay()];
+        let mut means = vec![0.0; self.network.topology().delay()];
         means.extend(generated.variance.chunks_exact(n).map(|row| row.iter().sum::<f64>() / n as f64));
         means
     }
@@ -177,7 +177,7 @@ impl Subject<'_> {
     fn variance_closed(&self, generated: &[Generated]) -> Peak {
         // The arm is 0.6 of its way out 17 steps after a branching.
         const BEGUN: usize = 17;
-        let (n, delay) = (self.data.channels().len(), self.network.topology.delay());
+        let (n, delay) = (self.data.channels().len(), self.network.topology().delay());
         let levels = self.levels();
         let mut cycles = Vec::new();
         for one in generated {
@@ -200,9 +200,9 @@ impl Subject<'_> {
             .map(|(s, sequence)| Start { initial_state: state(s), sensed: sequence.values() })
             .collect();
         let longest = self.data.sequences().iter().map(|sequence| sequence.len()).max().unwrap_or(0);
-        let steps = longest - self.network.topology.delay();
+        let steps = longest - self.network.topology().delay();
         let options = GenerationOptions { steps, feedback, seed: self.seed, contexts: false };
-        Ok(generate(self.network, &starts, &options, self.engine)?)
+        Ok(generate(self.network, &starts, &options, self.desk.engine())?)
     }
 
     /// D.2 without error regression: object and head from the recording, the arm from the own prediction.
@@ -215,7 +215,7 @@ impl Subject<'_> {
 
     /// Every `every`-th recording's reaction times, from the means predicted for its samples after the first xi.
     fn timed(&self, means: &[Vec<f64>], every: usize) -> Reactions {
-        let (n, delay) = (self.data.channels().len(), self.network.topology.delay());
+        let (n, delay) = (self.data.channels().len(), self.network.topology().delay());
         let rule = ReactionRule::default();
         let (mut times, mut literal, mut sides) = (Vec::new(), 0.0, [Vec::new(), Vec::new()]);
         for (sequence, means) in self.data.sequences().iter().step_by(every).zip(means) {
@@ -246,19 +246,27 @@ impl Subject<'_> {
     /// The feedback of D.2 in error regression: the arm's input is the own prediction.
     pub fn regression(&self, mut options: ErrorRegressionOptions) -> ErrorRegressionOptions {
         options.sensed[ARM].fill(0.0);
-        options.ahead = self.network.topology.delay() - 1;
+        options.ahead = self.network.topology().delay() - 1;
         options
     }
 
     /// D.2 with error regression over every `every`-th recording, all from one state.
-    pub fn regressed(&self, state: &[f64], options: &ErrorRegressionOptions, every: usize) -> Result<Regressed> {
-        let delay = self.network.topology.delay();
-        let set = self.engine.instruction_set();
+    pub fn regressed(
+        &self,
+        what: &str,
+        state: &[f64],
+        options: &ErrorRegressionOptions,
+        every: usize,
+    ) -> Result<Regressed> {
+        let delay = self.network.topology().delay();
         let (mut means, mut early, mut taken) = (Vec::new(), Vec::new(), Vec::new());
-        for sequence in self.data.sequences().iter().step_by(every) {
-            let mut regression = ErrorRegression::new(self.network, state, options.clone(), self.engine)?;
+        let sequences = self.data.sequences();
+        for (at, sequence) in sequences.iter().enumerate().step_by(every) {
+            self.desk.at(|| format!("{what}, recording {} of {}", at + 1, sequences.len()))?;
+            let mut regression = ErrorRegression::new(self.network, state, options.clone(), self.desk.engine())?;
             let (mut next, mut ahead) = (Vec::new(), Vec::new());
             for k in 0..sequence.len() {
+                self.desk.go_on()?;
                 let begun = Instant::now();
                 regression.observe(sequence.sample(k), &mut || true)?;
                 taken.push(begun.elapsed());

@@ -2,13 +2,13 @@
 //! figures are drawn from.
 
 use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions};
-use scrnn_sim::follower::{Branch, ControlStep, Controller, Followed, Outcome, follow, with_own_arm};
+use scrnn_sim::follower::{Branch, Controller, Followed, Outcome, follow, with_own_arm};
 use scrnn_sim::interaction::{Interaction, InteractionOptions, parse_order, random_order};
+use scrnn_tasks::interact::BRANCHES;
 use serde::Serialize;
 
 use super::trials::Subject;
-use scrnn_run::failure::Result;
-use scrnn_tasks::interact::BRANCHES;
+use crate::framework::Result;
 
 /// The order of the figures (5.3.2).
 pub const SHOWN: &str = "RLLLR";
@@ -56,26 +56,40 @@ pub struct Snapshot {
 
 impl Subject<'_> {
     fn controller<'a>(&'a self, state: &'a [f64]) -> Controller<'a> {
-        Controller {
-            network: self.network,
-            scaling: self.scaling,
-            initial_state: state,
-            instruction_set: self.engine.instruction_set(),
-        }
+        Controller { network: self.network, scaling: self.scaling, initial_state: state, engine: self.desk.engine() }
+    }
+
+    /// Follows an interaction to its end, unless somebody asks to stop.
+    fn follow(
+        &self,
+        state: &[f64],
+        options: &ErrorRegressionOptions,
+        interaction: &mut Interaction,
+        mut watch: impl FnMut(&ErrorRegression),
+    ) -> Result<Followed> {
+        let observe = |regression: &mut ErrorRegression, sample: &[f64]| regression.observe(sample, &mut || true);
+        follow(&self.controller(state), options, interaction, observe, |_, _, regression| {
+            watch(regression);
+            self.desk.go_on()
+        })
     }
 
     /// So many random orders from one state. Every network meets the same orders.
-    pub fn in_world(&self, state: &[f64], options: &ErrorRegressionOptions, trials: u64) -> Result<InWorld> {
+    pub fn in_world(
+        &self,
+        what: &str,
+        state: &[f64],
+        options: &ErrorRegressionOptions,
+        trials: u64,
+    ) -> Result<InWorld> {
         let options = with_own_arm(options.clone());
         let mut branches = Vec::new();
         for trial in 0..trials {
-            let order = random_order(BRANCHES, 0.5, trial);
-            let mut interaction = Interaction::new(&order, &InteractionOptions::default(), trial)?;
-            let observe = |regression: &mut ErrorRegression, sample: &[f64]| regression.observe(sample, &mut || true);
-            let unwatched = |_: &Interaction, _: &ControlStep, _: &ErrorRegression| Ok(());
-            let followed: Result<Followed> =
-                follow(&self.controller(state), &options, &mut interaction, observe, unwatched);
-            branches.extend(followed?.branches);
+            branches.extend(self.desk.part(&format!("{what}, interaction {}", trial + 1), || {
+                let order = random_order(BRANCHES, 0.5, trial);
+                let mut interaction = Interaction::new(&order, &InteractionOptions::default(), trial)?;
+                Ok(self.follow(state, &options, &mut interaction, |_| {})?.branches)
+            })?);
         }
         Ok(InWorld::of(branches))
     }
@@ -85,9 +99,8 @@ impl Subject<'_> {
         let mut options = with_own_arm(options.clone());
         options.ahead = AHEAD;
         let mut interaction = Interaction::new(&parse_order(SHOWN)?, &InteractionOptions::default(), self.seed)?;
-        let observe = |regression: &mut ErrorRegression, sample: &[f64]| regression.observe(sample, &mut || true);
         let mut snapshots = Vec::new();
-        let followed = follow(&self.controller(state), &options, &mut interaction, observe, |_, _, regression| {
+        let followed = self.follow(state, &options, &mut interaction, |regression| {
             let window = regression.window();
             let past = 0..window;
             let mut means: Vec<Vec<f64>> = past.clone().map(|k| regression.postdicted_mean(k).to_vec()).collect();
@@ -95,7 +108,6 @@ impl Subject<'_> {
             means.extend((0..=AHEAD).map(|k| regression.foreseen_mean(k).to_vec()));
             contexts.extend((0..=AHEAD).map(|k| regression.foreseen_context(k).to_vec()));
             snapshots.push(Snapshot { window, means, contexts, tail: regression.tail().to_vec() });
-            Result::Ok(())
         })?;
         Ok((followed, snapshots))
     }

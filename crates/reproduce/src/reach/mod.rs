@@ -2,10 +2,11 @@
 
 mod goals;
 mod page;
+mod processor_time;
 mod trials;
 mod variance;
+mod variance_page;
 
-use scrnn::engine::Engine;
 use scrnn_sim::agent::{Noise, Performance};
 use scrnn_sim::channels::{REACHING, VISION};
 use scrnn_sim::nao;
@@ -13,13 +14,22 @@ use scrnn_sim::reaching::{POSITIONS, gaze_at, places_between};
 use scrnn_sim::tutor::Demonstration;
 use serde::Serialize;
 
-use super::preset::{self, Kind};
-use super::study::{Learned, Measure, SeedResult, Study, Verdict};
+use crate::framework::preset::asset;
+use crate::framework::{Condition, Desk, Job, Kind, Measure, Result, Results, Study, Verdict};
 use scrnn_report::Section;
 use scrnn_run::assessment;
-use scrnn_run::failure::Result;
-use trials::{Company, Found, Given, Shifted, Trial, Who, pooled_rate, pooled_spread_ratio, samples, still};
+use trials::{Company, Found, Given, Played, Shifted, Trial, Who, pooled_rate, pooled_spread_ratio, samples, still};
 use variance::{ByPhase, by_phase};
+
+/// The S-CTRNN of the reaching experiment.
+const TAUGHT: Kind =
+    Kind { name: "S-CTRNN", suffix: "", presets: [asset!("reaching.toml"), asset!("reaching_fast.toml")] };
+/// The same, learned from three exact positions.
+const TAUGHT_EXACTLY: Kind = Kind {
+    name: "S-CTRNN of exact positions",
+    suffix: "-exact",
+    presets: [asset!("reaching_exact.toml"), asset!("reaching_exact_fast.toml")],
+};
 
 /// Half way between neighbouring positions.
 const BETWEEN: [f64; 2] = [-0.105, -0.035];
@@ -28,6 +38,9 @@ const BETWEEN: [f64; 2] = [-0.105, -0.035];
 const SHIFTS: [(usize, usize); 6] = [(0, 1), (0, 2), (1, 2), (1, 0), (2, 1), (2, 0)];
 /// Sample of the first shift: a hand that keeps time is far from the sphere then.
 const FIRST_SHIFT: usize = 48;
+
+/// The driver of the figures: the network with the noise that it predicts.
+const WITH_NOISE: &str = "noise";
 
 /// Sets the noise of performances apart from other numbers of a seed.
 const NOISE: u64 = 1000;
@@ -52,7 +65,7 @@ pub struct Findings {
     /// The demonstrations, one entry for each sequence.
     pub demonstrations: Vec<Found>,
     /// What came of each driver: by place, the three positions first, then those half way, then four at random.
-    pub conditions: Vec<Condition>,
+    pub conditions: Vec<Driven>,
     /// After the sphere was put elsewhere.
     pub shifts: Vec<Shifted>,
     /// Variance over the cycle.
@@ -63,7 +76,7 @@ pub struct Findings {
 
 /// One driver at several places.
 #[derive(Debug, Clone, Serialize)]
-pub struct Condition {
+pub struct Driven {
     /// Its name.
     pub key: &'static str,
     /// Its name on the page.
@@ -76,7 +89,7 @@ pub struct Condition {
     pub places: Vec<Found>,
 }
 
-impl Condition {
+impl Driven {
     /// The places that were learned.
     pub fn learned(&self) -> &[Found] {
         &self.places[..POSITIONS.len().min(self.places.len())]
@@ -95,7 +108,7 @@ impl Condition {
 
 impl Findings {
     /// A condition by its key.
-    pub fn condition(&self, key: &str) -> Option<&Condition> {
+    pub fn condition(&self, key: &str) -> Option<&Driven> {
         self.conditions.iter().find(|condition| condition.key == key)
     }
 
@@ -150,7 +163,7 @@ fn plans(study: &Reach, places: &[f64], constant: Vec<f64>, frozen: [f64; 2]) ->
     let plan = |key, label, who, cycles| Plan { key, label, who, cycles, places: places.to_vec(), frozen: None };
     let network = |noise| Who::Network { index: 0, noise };
     vec![
-        plan("noise", "S-CTRNN, predicted noise", network(Noise::Predicted), cycles),
+        plan(WITH_NOISE, "S-CTRNN, predicted noise", network(Noise::Predicted), cycles),
         plan("no_noise", "S-CTRNN, no noise", network(Noise::Off), fewer),
         plan("constant_noise", "S-CTRNN, noise of constant variance", network(Noise::Constant(constant)), fewer),
         Plan {
@@ -176,14 +189,20 @@ impl Study for Reach {
     type Findings = Findings;
     type Material = Material;
 
-    fn networks(&self) -> &'static [Kind] {
-        &[preset::REACH, preset::REACH_EXACT]
+    fn title(&self) -> &'static str {
+        "NAO learns to reach"
     }
 
-    fn evaluate(&self, networks: &[Learned], seed: u64, engine: &Engine) -> Result<(Findings, Material)> {
+    fn conditions(&self, _beyond: bool) -> Vec<Condition> {
+        vec![Condition::only(&[TAUGHT, TAUGHT_EXACTLY])]
+    }
+
+    fn evaluate(&self, job: &Job<'_>, desk: &Desk<'_>) -> Result<(Findings, Material)> {
+        let &Job { networks, seed, .. } = job;
+        let engine = desk.engine();
         let learned = &networks[0];
         let demonstrations = &learned.source.demonstrations;
-        let scaling = learned.experiment.data.scaling_for(&learned.source.data)?;
+        let scaling = &learned.scaling;
         let scaled = scaling.apply(&learned.source.data);
         let open = assessment::open_loop(&learned.network, &learned.states(), &scaled, engine)?;
         let n = REACHING.len();
@@ -193,54 +212,55 @@ impl Study for Reach {
         };
         let constant: Vec<f64> = (0..n).map(mean_variance).collect();
 
-        let company = Company::new(networks, seed, engine.instruction_set())?;
+        let company = Company::new(networks, seed, engine)?;
         let mut places = [&POSITIONS[..], &BETWEEN].concat();
         places.extend(places_between(seed, 4));
         let frozen = gaze_at(&nao::load_one_armed()?, POSITIONS[1])?;
-        let plans = plans(self, &places, constant, frozen);
-        let mut trials = Vec::new();
-        for plan in &plans {
-            for (place, &y) in plan.places.iter().enumerate() {
-                let performance = Performance { frozen: plan.frozen, ..still(y, plan.cycles) };
-                let pictures = plan.key == "noise" && place < POSITIONS.len();
-                trials.push(Trial {
-                    who: plan.who.clone(),
-                    performance,
-                    seed: seed + NOISE * (1 + place as u64),
-                    pictures,
-                });
-            }
+        let (mut conditions, mut speeds) = (Vec::new(), Vec::new());
+        let mut with_noise: Vec<(Performance, Given)> = Vec::new();
+        for Plan { key, label, who, cycles, places, frozen } in plans(self, &places, constant, frozen) {
+            let trial = |(place, &y): (usize, &f64)| Trial {
+                who: who.clone(),
+                performance: Performance { frozen, ..still(y, cycles) },
+                seed: seed + NOISE * (1 + place as u64),
+                pictures: key == WITH_NOISE && place < POSITIONS.len(),
+            };
+            let trials: Vec<Trial> = places.iter().enumerate().map(trial).collect();
+            let Played { found, speeds: own } = match key {
+                // Figures show these performances, so they are given whatever was kept.
+                WITH_NOISE => {
+                    let given = company.give_all(label, &trials, desk)?;
+                    let played = Played::of(&trials, &given, Found::in_performance);
+                    with_noise = trials.iter().map(|trial| trial.performance.clone()).zip(given).collect();
+                    played
+                }
+                _ => desk.part(label, || {
+                    Ok(Played::of(&trials, &company.give_all(label, &trials, desk)?, Found::in_performance))
+                })?,
+            };
+            speeds.extend(own);
+            let all: Vec<&Found> = found.iter().collect();
+            let (rate, spread_ratio) = (pooled_rate(&all), pooled_spread_ratio(&all));
+            conditions.push(Driven { key, label, rate, spread_ratio, places: found });
         }
-        let shifts = trials.len();
-        for (k, &(from, to)) in SHIFTS.iter().enumerate() {
+        let shift = |(k, &(from, to)): (usize, &(usize, usize))| {
             let at = FIRST_SHIFT + 2 * k;
             let shift = Some((at, POSITIONS[to]));
             let performance =
                 Performance { shift, samples: at + samples(self.after_shift), ..still(POSITIONS[from], 0) };
             let who = Who::Network { index: 0, noise: Noise::Predicted };
-            trials.push(Trial { who, performance, seed: seed + NOISE * (100 + k as u64), pictures: false });
-        }
-        let given = company.give_all(&trials, engine.threads())?;
-
-        let mut conditions = Vec::new();
-        let mut next = 0;
-        for Plan { key, label, places, .. } in plans {
-            let own = next..next + places.len();
-            next = own.end;
-            let found: Vec<Found> =
-                own.map(|k| Found::in_performance(&trials[k].performance, &given[k].performed)).collect();
-            let all: Vec<&Found> = found.iter().collect();
-            let (rate, spread_ratio) = (pooled_rate(&all), pooled_spread_ratio(&all));
-            conditions.push(Condition { key, label, rate, spread_ratio, places: found });
-        }
-        let after = trials[shifts..].iter().zip(&given[shifts..]);
-        let shifted = after.filter_map(|(trial, given)| Shifted::of(&trial.performance, &given.performed)).collect();
-        let driving: Vec<_> = given[..POSITIONS.len()]
+            Trial { who, performance, seed: seed + NOISE * (100 + k as u64), pictures: false }
+        };
+        let trials: Vec<Trial> = SHIFTS.iter().enumerate().map(shift).collect();
+        let shifted: Played<Option<Shifted>> = desk.part("shifts of the sphere", || {
+            Ok(Played::of(&trials, &company.give_all("shifts of the sphere", &trials, desk)?, Shifted::of))
+        })?;
+        speeds.extend(shifted.speeds);
+        let driving: Vec<_> = with_noise[..POSITIONS.len()]
             .iter()
-            .map(|given| (given.performed.decisions.as_slice(), given.performed.cycles.as_slice()))
+            .map(|(_, given)| (given.performed.decisions.as_slice(), given.performed.cycles.as_slice()))
             .collect();
         let variance = by_phase(demonstrations, &scaled, &open, &driving, scaling.scale());
-        let mut speeds: Vec<f64> = given.iter().map(|given| given.speed).collect();
         speeds.sort_by(f64::total_cmp);
         let demonstrated = demonstrations.iter().map(|one| {
             let expected = one.samples.len() / n / scrnn_sim::reaching::CYCLE;
@@ -249,13 +269,12 @@ impl Study for Reach {
         let findings = Findings {
             demonstrations: demonstrated.collect(),
             conditions,
-            shifts: shifted,
+            shifts: shifted.found.into_iter().flatten().collect(),
             variance,
             speed: speeds[speeds.len() / 2],
         };
         // The positions and what lies half way, from right to left.
-        let performances =
-            [0, 3, 1, 4, 2].map(|k| (trials[k].performance.clone(), given[k].clone())).into_iter().collect();
+        let performances = [0, 3, 1, 4, 2].map(|k| with_noise[k].clone()).into_iter().collect();
         Ok((findings, Material { demonstrations: demonstrations.clone(), performances }))
     }
 
@@ -263,12 +282,16 @@ impl Study for Reach {
         goals::measures()
     }
 
-    fn verdicts(&self, seeds: &[SeedResult<Findings>]) -> Vec<Verdict> {
-        goals::verdicts(seeds)
+    fn times(&self) -> Vec<Measure<Findings>> {
+        goals::times()
     }
 
-    fn sections(&self, seed: &SeedResult<Findings>, material: &Material) -> Vec<Section> {
-        page::sections(&seed.findings, material)
+    fn verdicts(&self, results: &Results<Findings>) -> Vec<Verdict> {
+        goals::verdicts(&results.jobs)
+    }
+
+    fn sections(&self, results: &Results<Findings>, materials: &[Material]) -> Vec<Section> {
+        page::sections(&results.jobs, materials)
     }
 }
 
@@ -278,66 +301,4 @@ pub fn channel(name: &str) -> usize {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::preset::Preset;
-    use crate::study::TrainingFacts;
-    use scrnn::initialization::initialize;
-    use scrnn_report::Page;
-    use scrnn_run::source;
-
-    /// Networks that have learned nothing, beside three short demonstrations.
-    fn networks() -> Vec<Learned> {
-        let learned = |kind: &Kind| {
-            let mut experiment = kind.experiment(Preset::Fast, 2, Some(1), &[]).unwrap();
-            (experiment.data.sequences, experiment.data.steps) = (Some(3), Some(36));
-            let source = source::load(&experiment.data, 2).unwrap();
-            let (network, initial_states) = initialize(&experiment.topology(6).unwrap(), 3, 2);
-            let training = TrainingFacts {
-                network: kind.name,
-                folder: String::new(),
-                epochs: 0,
-                nll: None,
-                mse: None,
-                seconds: 0.0,
-                recoveries: 0,
-                diverged: None,
-            };
-            Learned { name: kind.name, experiment, network, initial_states, source, history: Vec::new(), training }
-        };
-        REACH.networks().iter().map(learned).collect()
-    }
-
-    #[test]
-    fn a_short_reproduction_judges_every_driver_and_the_same_seed_comes_to_the_same() {
-        let study = Reach { cycles: 6, fewer: 1, after_shift: 1 };
-        let networks = networks();
-        let evaluate = |threads| {
-            let engine = Engine::new(threads, scrnn::engine::InstructionSet::best()).unwrap();
-            let (mut findings, material) = study.evaluate(&networks, 2, &engine).unwrap();
-            findings.speed = 0.0;
-            (serde_json::to_value(&findings).unwrap(), findings, material)
-        };
-        let (first, findings, material) = evaluate(2);
-        assert_eq!(first, evaluate(1).0);
-        let keys: Vec<&str> = findings.conditions.iter().map(|condition| condition.key).collect();
-        let expected = ["noise", "no_noise", "constant_noise", "frozen", "exact", "replay", "mixture", "mixture_noise"];
-        assert_eq!(keys, expected);
-        assert_eq!((findings.conditions[0].places.len(), findings.conditions[4].places.len()), (9, 5));
-        // A tutor touches, an untrained network does not, and a replayed demonstration does where it was given.
-        assert!(findings.demonstrations.iter().all(|one| one.rate() == 1.0));
-        assert!(findings.rate("noise").unwrap() < 0.5);
-        assert!(findings.condition("replay").unwrap().learned().iter().any(|found| found.touched > 0));
-        assert_eq!((findings.shifts.len(), findings.variance.phase.len()), (6, 12));
-
-        let seed = SeedResult { seed: 2, seconds: 1.0, threads: 1, trainings: Vec::new(), findings };
-        let page = Page { title: "t".into(), lede: String::new(), sections: study.sections(&seed, &material) };
-        let files: Vec<&str> = page.figures().map(|figure| figure.file.as_str()).collect();
-        assert_eq!(files, ["over-time", "snapshots", "phase-plots", "variance-by-phase"]);
-        assert!(!page.html().contains("NaN"));
-        let verdicts = study.verdicts(&[seed]);
-        assert_eq!(verdicts.len(), 17);
-        let met = |goal: &str| verdicts.iter().find(|verdict| verdict.goal.starts_with(goal)).unwrap().met;
-        assert!(!met("touches per cycle, no noise") && !met("touches per cycle, pooled") && met("time of a seed"));
-    }
-}
+mod tests;

@@ -8,26 +8,31 @@ use scrnn_sim::touching::{Cycle, HandState};
 use scrnn_sim::tutor::Demonstration;
 
 use super::trials::{Found, Given, decided};
-use super::{Condition, Findings, Material, channel};
+use super::{Driven, Findings, Material, channel};
+use crate::framework::JobResult;
 use scrnn_report::{Block, Chart, Drawing, Figure, Panel, Picture, Pictures, Section, Series, Sheet, Tone, View};
 
 /// Samples of the figures over time: five cycles.
 const SHOWN: usize = 5 * CYCLE;
 
-/// All sections.
-pub fn sections(findings: &Findings, material: &Material) -> Vec<Section> {
+/// All sections: of the first seed, and the drivers of all.
+pub fn sections(jobs: &[JobResult<Findings>], materials: &[Material]) -> Vec<Section> {
+    let (Some(first), Some(material)) = (jobs.first(), materials.first()) else { return Vec::new() };
+    let findings = &first.findings;
+    let mut compared: Vec<Block> = jobs.iter().map(|job| drivers(job, jobs.len() > 1)).collect();
+    compared.push(meaning());
     vec![
         Section {
             title: "Touching".into(),
             blocks: vec![over_time(material), snapshots(material), touches(findings), shifts(findings)],
         },
         Section { title: "Generalisation".into(), blocks: vec![phase_plots(material)] },
-        Section { title: "Variance over the cycle".into(), blocks: vec![variance(findings), variance_table(findings)] },
-        Section { title: "Drivers compared".into(), blocks: vec![drivers(findings), meaning()] },
+        Section { title: "Variance over the cycle".into(), blocks: super::variance_page::blocks(&findings.variance) },
+        Section { title: "Drivers compared".into(), blocks: compared },
     ]
 }
 
-fn figure(file: &str, title: &str, caption: &str, thesis: &str, drawing: impl Into<Drawing>) -> Block {
+pub fn figure(file: &str, title: &str, caption: &str, thesis: &str, drawing: impl Into<Drawing>) -> Block {
     let [file, title, caption, thesis] = [file, title, caption, thesis].map(str::to_owned);
     Block::Figure(Box::new(Figure { file, title, caption, thesis, drawing: drawing.into() }))
 }
@@ -310,68 +315,13 @@ fn shifts(findings: &Findings) -> Block {
     })
 }
 
-/// Over the cycle.
-fn variance(findings: &Findings) -> Block {
-    let by_phase = &findings.variance;
-    let line = |name: &str, tone, values: &[f64]| {
-        let points = by_phase.phase.iter().zip(values).map(|(&phase, &v)| (f64::from(phase), v.log10())).collect();
-        Series::line(name, tone, points)
-    };
-    let series = vec![
-        line("predicted one step ahead", Tone::Ours, &by_phase.predicted),
-        line("squared error of the prediction", Tone::Truth, &by_phase.residual),
-        line("of the demonstrations, within a sequence", Tone::Data, &by_phase.within),
-        line("predicted while driving the robot", Tone::Level(2), &by_phase.driving),
-    ];
-    let panels = vec![Panel::spanning("", series)];
-    let chart = Chart {
-        columns: 1,
-        aspect: 2.6,
-        x_label: "samples from the touch".into(),
-        y_label: "log10 of variance".into(),
-        panels,
-    };
-    figure(
-        "variance-by-phase",
-        "Predicted variance over the cycle",
-        "Mean over the arm's four channels, in the network's units. What is predicted is the error of the next step, which is less \
-         than how much the demonstrations differ from each other: much of that is known half a second before.",
-        "4.3.1: the variance decreases to the minimum at the very moment of touching the object and increases after the robot \
-         retracts its arm.",
-        chart,
-    )
-}
-
-fn variance_table(findings: &Findings) -> Block {
-    let v = &findings.variance;
-    let row = |k: usize| {
-        let cell = |value: f64| format!("{value:.2e}");
-        vec![
-            v.phase[k].to_string(),
-            cell(v.predicted[k]),
-            cell(v.residual[k]),
-            format!("{:.2}", v.predicted[k] / v.residual[k]),
-            cell(v.within[k]),
-            cell(v.driving[k]),
-        ]
-    };
-    Block::Sheet(Sheet {
-        caption: "The same in numbers".into(),
-        head: ["samples from the touch", "predicted", "squared error", "ratio", "demonstrations", "while driving"]
-            .map(String::from)
-            .to_vec(),
-        rows: (0..v.phase.len()).map(row).collect(),
-        note: String::new(),
-    })
-}
-
 /// The network beside what it is compared with.
-fn drivers(findings: &Findings) -> Block {
+fn drivers(job: &JobResult<Findings>, several: bool) -> Block {
     let share = |found: &[Found]| {
         let all: Vec<&Found> = found.iter().collect();
         if all.is_empty() { "\u{2013}".to_owned() } else { format!("{:.3}", super::trials::pooled_rate(&all)) }
     };
-    let row = |condition: &Condition| {
+    let row = |condition: &Driven| {
         let between = condition.others().get(..2).unwrap_or_default();
         let random = condition.others().get(2..).unwrap_or_default();
         vec![
@@ -384,11 +334,11 @@ fn drivers(findings: &Findings) -> Block {
         ]
     };
     Block::Sheet(Sheet {
-        caption: "Touches per cycle".into(),
+        caption: if several { format!("Touches per cycle, {}", job.called()) } else { "Touches per cycle".into() },
         head: ["driver", "learned positions", "half way", "at random", "all", "spread ratio"]
             .map(String::from)
             .to_vec(),
-        rows: findings.conditions.iter().map(row).collect(),
+        rows: job.findings.conditions.iter().map(row).collect(),
         note: "Without noise nothing but the robot's own motors makes cycles differ; its spread ratio says little."
             .into(),
     })

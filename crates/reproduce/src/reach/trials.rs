@@ -1,22 +1,21 @@
 //! Performances of the reaching experiment: who drives the arm, where the sphere lies, what came of it.
 
 use scrnn::analysis::mixture::{GaussianMixture, MixtureOptions};
-use scrnn::engine::InstructionSet;
+use scrnn::engine::Engine;
+use scrnn::jobs::side_by_side;
 use scrnn_sim::agent::{
     Decision, Driver, MixtureDriver, NetworkDriver, Noise, Performance, Performed, Replay, Snapshot, perform,
 };
 use scrnn_sim::channels::{REACHING, VISION};
-use scrnn_sim::parallel::in_parallel;
 use scrnn_sim::reaching::{CYCLE, PERIOD, POSITIONS};
 use scrnn_sim::scene::Scene;
 use scrnn_sim::touching::{Cycle, spread};
 use scrnn_sim::tutor::Demonstration;
 use scrnn_sim::world::WorldOptions;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use super::super::study::Learned;
-use crate::processor_time::ProcessorTime;
-use scrnn_run::failure::{Failure, Result};
+use super::processor_time::ProcessorTime;
+use crate::framework::{Desk, Learned, Result};
 
 /// Components of the mixture: with 41 of them it has as many numbers as the network, about 1480.
 pub const COMPONENTS: usize = 41;
@@ -78,7 +77,7 @@ pub fn still(y: f64, cycles: usize) -> Performance {
 #[derive(Debug)]
 pub struct Company<'a> {
     networks: &'a [Learned],
-    set: InstructionSet,
+    engine: Engine,
     /// The mean arm at each sample, for each position.
     replays: Vec<Vec<[f64; 4]>>,
     mixture: GaussianMixture,
@@ -86,7 +85,7 @@ pub struct Company<'a> {
 
 impl<'a> Company<'a> {
     /// Fits what the network is compared with.
-    pub fn new(networks: &'a [Learned], seed: u64, set: InstructionSet) -> Result<Self> {
+    pub fn new(networks: &'a [Learned], seed: u64, engine: &Engine) -> Result<Self> {
         let demonstrations = &networks[0].source.demonstrations;
         let replays = (0..POSITIONS.len()).map(|position| mean_arms(demonstrations, position)).collect();
         let mut points = Vec::new();
@@ -98,15 +97,14 @@ impl<'a> Company<'a> {
         }
         let options = MixtureOptions { components: COMPONENTS, seed, ..MixtureOptions::default() };
         let mixture = GaussianMixture::fit(&points, 1 + REACHING.len(), &options)?;
-        Ok(Self { networks, set, replays, mixture })
+        Ok(Self { networks, engine: engine.clone(), replays, mixture })
     }
 
     fn driver(&self, trial: &Trial) -> Result<Box<dyn Driver>> {
         Ok(match &trial.who {
             Who::Network { index, noise } => {
-                let Learned { network, initial_states, experiment, source, .. } = &self.networks[*index];
-                let scaling = experiment.data.scaling_for(&source.data)?;
-                Box::new(NetworkDriver::new(network, initial_states.mean(), &scaling, noise, trial.seed, self.set)?)
+                let Learned { network, initial_states, scaling, .. } = &self.networks[*index];
+                Box::new(NetworkDriver::new(network, initial_states.mean(), scaling, noise, trial.seed, &self.engine)?)
             }
             Who::Replay => {
                 let distance = |k: &usize| (POSITIONS[*k] - trial.performance.y).abs();
@@ -137,9 +135,32 @@ impl<'a> Company<'a> {
         Ok(Given { performed, pictures, speed })
     }
 
-    /// Gives all of them, on several threads.
-    pub fn give_all(&self, trials: &[Trial], threads: usize) -> Result<Vec<Given>> {
-        in_parallel::<_, Failure>(trials.len(), threads, |k| self.give(&trials[k]))
+    /// Gives all of them, side by side on the engine's threads.
+    pub fn give_all(&self, label: &str, trials: &[Trial], desk: &Desk<'_>) -> Result<Vec<Given>> {
+        side_by_side(trials.len(), desk.engine().threads(), |k, _| {
+            desk.at(|| format!("{label}, {} of {}", k + 1, trials.len()))?;
+            self.give(&trials[k])
+        })
+    }
+}
+
+/// What is kept of several performances.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Played<T> {
+    /// What came of each.
+    pub found: Vec<T>,
+    /// How many times faster than real time each was.
+    pub speeds: Vec<f64>,
+}
+
+impl<T> Played<T> {
+    /// Of performances, each judged by `judge`.
+    pub fn of(trials: &[Trial], given: &[Given], judge: impl Fn(&Performance, &Performed) -> T) -> Self {
+        let both = trials.iter().zip(given);
+        Self {
+            found: both.map(|(trial, given)| judge(&trial.performance, &given.performed)).collect(),
+            speeds: given.iter().map(|given| given.speed).collect(),
+        }
     }
 }
 
@@ -155,7 +176,7 @@ fn mean_arms(demonstrations: &[Demonstration], position: usize) -> Vec<[f64; 4]>
 }
 
 /// What came of a movement with the sphere at one place.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Found {
     /// Across, in metres.
     pub y: f64,
@@ -240,7 +261,7 @@ pub fn pooled_spread_ratio(found: &[&Found]) -> Option<f64> {
 }
 
 /// After the sphere was put elsewhere.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Shifted {
     /// From where, in metres.
     pub from: f64,

@@ -38,9 +38,7 @@ impl Experiment {
     pub fn plan(&self) -> Plan {
         let training = &self.training;
         let optimiser = match training.optimiser {
-            OptimiserName::Momentum => {
-                Optimiser::Momentum(training.momentum.clone().unwrap_or_default())
-            }
+            OptimiserName::Momentum => Optimiser::Momentum(training.momentum.clone().unwrap_or_default()),
             OptimiserName::Adam => Optimiser::Adam(training.adam.clone().unwrap_or_default()),
         };
         Plan {

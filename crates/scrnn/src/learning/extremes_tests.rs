@@ -1,6 +1,5 @@
 //! Learning at the edges of numbers and of data. What must come out is what a user would want: a network, or a word; never NaN.
 
-use std::ops::ControlFlow;
 use super::*;
 use crate::dataset::{Dataset, Sequence};
 use crate::engine::Engine;
@@ -11,6 +10,7 @@ use crate::network::Network;
 use crate::parameters::Block;
 use crate::recognition::{RecognitionOptions, recognize};
 use crate::topology::{Group, Prediction, Topology};
+use std::ops::ControlFlow;
 
 fn data(channels: usize, sequences: &[Vec<f64>]) -> Dataset {
     let rows = sequences.iter().map(|values| Sequence::new("", channels, values.clone()).unwrap()).collect();

@@ -1,6 +1,5 @@
 //! The loop of learning: evaluate, report, ascend.
 
-use std::ops::ControlFlow;
 use super::adam::AdamRule;
 use super::batches::Batches;
 use super::divergence::Divergence;
@@ -15,6 +14,7 @@ use crate::error::{Error, Result};
 use crate::initial_states::InitialStates;
 use crate::network::Network;
 use crate::objective::{Backend, Request, Run};
+use std::ops::ControlFlow;
 
 /// What the evaluation of an epoch found.
 #[derive(Debug, Clone, PartialEq)]

@@ -16,8 +16,8 @@ mod state;
 pub use divergence::Divergence;
 pub use guard::Recovery;
 pub use learner::{EpochReport, Learner, Observer, Outcome};
-pub use state::{OptimiserState, StateTensor};
 pub use plan::{Adam, AdaptiveRate, Lbfgs, Momentum, OnDivergence, Optimiser, Plan, PriorStep};
+pub use state::{OptimiserState, StateTensor};
 
 #[cfg(test)]
 mod extremes_tests;

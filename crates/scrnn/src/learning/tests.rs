@@ -1,11 +1,11 @@
 //! Learning as a whole: it ascends, resumes, rolls back, and does not depend on threads.
 
-use std::ops::ControlFlow;
 use super::*;
 use crate::dataset::{Dataset, Sequence};
 use crate::engine::{Engine, InstructionSet};
 use crate::initialization::initialize;
 use crate::topology::{Group, Prediction, Topology};
+use std::ops::ControlFlow;
 
 fn waves(sequences: usize, steps: usize) -> Dataset {
     let of = |s: usize| {
@@ -79,7 +79,7 @@ fn a_learner_without_variance_lowers_the_squared_error() {
     let plan = momentum(1500, Momentum { rate: 0.05, ..Momentum::default() });
     let mut learner = Learner::new(network, states, &waves(3, 60), plan, &Engine::serial()).unwrap();
     let mut reports = Vec::new();
-    learner.run(&mut |report: &EpochReport, _: &Learner| {
+    let _ = learner.run(&mut |report: &EpochReport, _: &Learner| {
         reports.push(report.clone());
         ControlFlow::Continue(())
     });
@@ -130,7 +130,7 @@ fn stopping_and_restoring_goes_on_bit_for_bit() {
         refined(batches(60), 0.8),
     ] {
         let mut whole = learner(plan.clone(), 1);
-        run(&mut whole);
+        let _ = run(&mut whole);
 
         let mut part = learner(plan.clone(), 1);
         let stop_at_23 = |report: &EpochReport, _: &Learner| match report.epoch {
@@ -143,7 +143,7 @@ fn stopping_and_restoring_goes_on_bit_for_bit() {
         let (network, states) = (part.network().clone(), part.initial_states().clone());
         let mut rest = Learner::new(network, states, &waves(3, 60), plan, &engine).unwrap();
         rest.restore(part.epoch(), &part.optimiser_state()).unwrap();
-        run(&mut rest);
+        let _ = run(&mut rest);
         assert!(bits(&whole) == bits(&rest));
         assert_eq!(whole.optimiser_state(), rest.optimiser_state());
     }
@@ -159,7 +159,7 @@ fn any_number_of_threads_learns_the_same_bits() {
         let plan = Plan { optimiser: Optimiser::Adam(Adam { batch_size, ..Adam::default() }), ..adam(40) };
         let plan = if share > 0.0 { refined(plan, share) } else { plan };
         let mut learner = Learner::new(network, states, &data, plan, &engine).unwrap();
-        run(&mut learner);
+        let _ = run(&mut learner);
         bits(&learner)
     };
     let learn = |threads: usize, batch_size: usize| learn_in(threads, batch_size, 0.0);
@@ -182,7 +182,7 @@ fn a_training_in_batches_evaluates_all_at_both_ends() {
     let evaluated = |network, states| {
         let mut learner = Learner::new(network, states, &waves(3, 60), adam(0), &Engine::serial()).unwrap();
         let mut watch = Watch::default();
-        learner.run(&mut watch);
+        let _ = learner.run(&mut watch);
         watch.reports.remove(0)
     };
     let near = |a: &EpochReport, b: &EpochReport| {
@@ -227,7 +227,7 @@ fn lbfgs_takes_over_from_its_share_on_never_falls_and_gets_further() {
     assert_eq!(trained.run(&mut watch), Outcome::Finished);
     let mut adam_alone = learner(batches(180), 1);
     let mut before = Watch::default();
-    adam_alone.run(&mut before);
+    let _ = adam_alone.run(&mut before);
     // The optimiser's epochs are those of a plan of its own, its schedule included; the last evaluation is of all at once.
     assert_eq!(watch.reports.len(), 301);
     assert_eq!(watch.reports[..180], before.reports[..180]);
@@ -250,7 +250,7 @@ fn lbfgs_takes_over_from_its_share_on_never_falls_and_gets_further() {
 fn a_checkpoint_without_the_pairs_of_lbfgs_or_with_impossible_ones_is_refused() {
     let plan = refined(adam(20), 0.5);
     let mut old = learner(plan.clone(), 1);
-    run(&mut old);
+    let _ = run(&mut old);
     let take_up = |epoch: u64, state: &crate::learning::OptimiserState| {
         let (network, states) = (old.network().clone(), old.initial_states().clone());
         let mut new = Learner::new(network, states, &waves(3, 60), plan.clone(), &Engine::serial()).unwrap();
@@ -284,7 +284,7 @@ fn ten_times_the_sequences_take_ten_times_as_long() {
         for (learner, fastest) in learners.iter_mut().zip(&mut fastest) {
             // Two epochs each time: the second one's duration.
             let (end, mut begin) = (learner.epoch() + 2, std::time::Instant::now());
-            learner.run(&mut |report: &EpochReport, _: &Learner| {
+            let _ = learner.run(&mut |report: &EpochReport, _: &Learner| {
                 if report.epoch + 1 == end {
                     begin = std::time::Instant::now();
                 }
@@ -302,7 +302,7 @@ fn ten_times_the_sequences_take_ten_times_as_long() {
 fn recomputation_learns_the_same_bits() {
     let learn = |recompute| {
         let mut learner = learner(Plan { recompute, ..adam(20) }, 1);
-        run(&mut learner);
+        let _ = run(&mut learner);
         bits(&learner)
     };
     assert!(learn(true) == learn(false));
@@ -434,15 +434,15 @@ fn a_guarded_training_that_is_stopped_anywhere_goes_on_bit_for_bit() {
         let plan = guarded(400, optimiser);
         let mut whole = learner(plan.clone(), 1);
         let mut watch = Watch::default();
-        whole.run(&mut watch);
+        let _ = whole.run(&mut watch);
         let recovered = watch.recoveries[0].divergence.epoch;
         for stop in [recovered - 1, recovered, recovered + 1, 390] {
             let mut part = learner(plan.clone(), 1);
-            part.run(&mut Watch { stop_at: Some(stop), ..Watch::default() });
+            let _ = part.run(&mut Watch { stop_at: Some(stop), ..Watch::default() });
             let (network, states) = (part.network().clone(), part.initial_states().clone());
             let mut rest = Learner::new(network, states, &waves(3, 60), plan.clone(), &Engine::serial()).unwrap();
             rest.restore(part.epoch(), &part.optimiser_state()).unwrap();
-            rest.run(&mut Watch::default());
+            let _ = rest.run(&mut Watch::default());
             assert!(bits(&whole) == bits(&rest), "stopped at {stop}");
             assert_eq!(whole.optimiser_state(), rest.optimiser_state());
         }
@@ -468,7 +468,7 @@ fn a_training_that_no_rate_can_save_stops_at_its_best_network() {
 fn a_state_without_a_guard_is_taken_up_by_one_and_a_broken_one_is_refused() {
     let plan = guarded(50, Optimiser::Momentum(Momentum::default()));
     let mut old = learner(momentum(20, Momentum::default()), 1);
-    run(&mut old);
+    let _ = run(&mut old);
     let take_up = |state: &crate::learning::OptimiserState| {
         let (network, states) = (old.network().clone(), old.initial_states().clone());
         let mut new = Learner::new(network, states, &waves(3, 60), plan.clone(), &Engine::serial()).unwrap();

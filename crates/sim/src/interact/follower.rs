@@ -6,11 +6,11 @@
 use nalgebra::{Isometry3, Point3};
 use scrnn::analysis::excursions::{Levels, Side};
 use scrnn::analysis::reaction::{ReactionRule, arm_error};
-use scrnn::engine::InstructionSet;
+use scrnn::engine::Engine;
 use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions, Regression};
 use scrnn::network::Network;
 use scrnn::scaling::Scaling;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::interaction::{ARM, CHANNELS, Collision, Interaction, arm_postures};
 use super::order::{branchings, primitive_len};
@@ -26,8 +26,8 @@ pub struct Controller<'a> {
     pub scaling: &'a Scaling,
     /// u_0.
     pub initial_state: &'a [f64],
-    /// Instructions to compute with.
-    pub instruction_set: InstructionSet,
+    /// What to compute with.
+    pub engine: &'a Engine,
 }
 
 /// The feedback of an interaction: the arm runs on its own predictions, and its errors, which are none, are not regressed
@@ -65,7 +65,7 @@ pub struct ControlStep {
 }
 
 /// How a branching went.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
     /// The hand went to the object's side.
@@ -79,7 +79,7 @@ pub enum Outcome {
 }
 
 /// One branching.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Branch {
     /// Where the object went.
     pub side: Side,
@@ -116,25 +116,24 @@ pub fn follow<E: From<Error>>(
     mut observe: impl FnMut(&mut ErrorRegression, &[f64]) -> scrnn::error::Result<Regression>,
     mut watch: impl FnMut(&Interaction, &ControlStep, &ErrorRegression) -> std::result::Result<(), E>,
 ) -> std::result::Result<Followed, E> {
-    let channels = controller.network.topology.channels();
+    let channels = controller.network.topology().channels();
     if channels != CHANNELS.len() {
         let what = "the network's list of channels";
         return Err(Error::Length { what, found: channels, needed: CHANNELS.len() }.into());
     }
-    let Controller { network, scaling, initial_state, instruction_set } = *controller;
-    let mut regression =
-        ErrorRegression::new(network, initial_state, options.clone(), instruction_set).map_err(Error::from)?;
+    let Controller { network, scaling, initial_state, engine } = *controller;
+    let mut regression = ErrorRegression::new(network, initial_state, options.clone(), engine).map_err(Error::from)?;
     let levels = hand_levels()?;
     let [centre, ..] = arm_postures();
     let mut arm = centre;
     let mut steps: Vec<ControlStep> = Vec::with_capacity(interaction.samples());
     for k in 0..interaction.samples() {
         let sensed = interaction.sense();
-        let predicted = (k >= network.topology.delay()).then(|| array(regression.mean()));
+        let predicted = (k >= network.topology().delay()).then(|| array(regression.mean()));
         let variance = if predicted.is_some() { regression.variance().to_vec() } else { Vec::new() };
         let scaled: [f64; 8] = std::array::from_fn(|channel| scaling.to_scaled(channel, sensed[channel]));
         let done = observe(&mut regression, &scaled).map_err(Error::from)?;
-        if k + 1 >= network.topology.delay() {
+        if k + 1 >= network.topology().delay() {
             let mean = regression.mean();
             arm = std::array::from_fn(|joint| scaling.to_raw(ARM.start + joint, mean[ARM.start + joint]));
         }

@@ -61,9 +61,8 @@ fn untrained() -> (Network, Vec<f64>, Scaling) {
 #[test]
 fn an_object_out_of_view_stays_where_it_was_seen_last_and_the_interaction_goes_on() {
     let (network, initial_state, scaling) = untrained();
-    let instruction_set = InstructionSet::best();
-    let controller =
-        Controller { network: &network, scaling: &scaling, initial_state: &initial_state, instruction_set };
+    let engine = &Engine::serial();
+    let controller = Controller { network: &network, scaling: &scaling, initial_state: &initial_state, engine };
     let options = with_own_arm(ErrorRegressionOptions { iterations: 1, ..ErrorRegressionOptions::new(8) });
     let mut interaction = Interaction::new(&parse_order("R").unwrap(), &InteractionOptions::default(), 5).unwrap();
     interaction.turn_away();
@@ -92,9 +91,8 @@ fn whoever_watches_can_end_an_interaction() {
         }
     }
     let (network, initial_state, scaling) = untrained();
-    let instruction_set = InstructionSet::best();
-    let controller =
-        Controller { network: &network, scaling: &scaling, initial_state: &initial_state, instruction_set };
+    let engine = &Engine::serial();
+    let controller = Controller { network: &network, scaling: &scaling, initial_state: &initial_state, engine };
     let options = with_own_arm(ErrorRegressionOptions { iterations: 0, ..ErrorRegressionOptions::new(8) });
     let mut interaction = Interaction::new(&parse_order("R").unwrap(), &InteractionOptions::default(), 5).unwrap();
     let observe = |regression: &mut ErrorRegression, sample: &[f64]| regression.observe(sample, &mut || true);
@@ -110,9 +108,8 @@ fn whoever_watches_can_end_an_interaction() {
 fn the_loop_runs_from_sensors_to_arm_and_the_same_seed_gives_the_same_bits() {
     let (network, initial_state, scaling) = untrained();
     let [centre, ..] = arm_postures();
-    let instruction_set = InstructionSet::best();
-    let controller =
-        Controller { network: &network, scaling: &scaling, initial_state: &initial_state, instruction_set };
+    let engine = &Engine::serial();
+    let controller = Controller { network: &network, scaling: &scaling, initial_state: &initial_state, engine };
     let options = with_own_arm(ErrorRegressionOptions { iterations: 2, ..ErrorRegressionOptions::new(8) });
     let observe = |regression: &mut ErrorRegression, sample: &[f64]| regression.observe(sample, &mut || true);
     let run = || {

@@ -111,7 +111,7 @@ pub struct Interaction {
 }
 
 /// What the self-robot ran into.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Collision {
     /// The other robot's hand.

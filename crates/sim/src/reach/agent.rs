@@ -11,7 +11,7 @@
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use scrnn::analysis::mixture::MixtureRegression;
-use scrnn::engine::InstructionSet;
+use scrnn::engine::Engine;
 use scrnn::generation::{ChannelFeedback, Feedback, Running};
 use scrnn::network::Network;
 use scrnn::scaling::Scaling;
@@ -78,9 +78,9 @@ impl NetworkDriver {
         scaling: &Scaling,
         noise: &Noise,
         seed: u64,
-        set: InstructionSet,
+        engine: &Engine,
     ) -> Result<Self> {
-        let (channels, delay) = (network.topology.channels(), network.topology.delay());
+        let (channels, delay) = (network.topology().channels(), network.topology().delay());
         if channels != REACHING.len() || delay != 1 {
             let found = format!("on {channels} channels with a delay of {delay}");
             return Err(Error::Setting {
@@ -105,7 +105,7 @@ impl NetworkDriver {
             }
             _ => None,
         };
-        let running = Running::new(network, initial_state, feedback, seed, set)?;
+        let running = Running::new(network, initial_state, feedback, seed, engine)?;
         Ok(Self { running, scaling: scaling.clone(), constant, next: None })
     }
 }

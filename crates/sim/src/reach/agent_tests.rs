@@ -26,7 +26,7 @@ fn ideal(y: f64) -> Replay {
 fn driver(noise: &Noise) -> NetworkDriver {
     let topology = Topology::s_ctrnn(6, 8, 2.0).unwrap();
     let (network, states) = initialize(&topology, 1, 3);
-    NetworkDriver::new(&network, states.mean(), &Scaling::identity(6), noise, 5, InstructionSet::best()).unwrap()
+    NetworkDriver::new(&network, states.mean(), &Scaling::identity(6), noise, 5, &Engine::serial()).unwrap()
 }
 
 #[test]
@@ -99,9 +99,8 @@ fn constant_noise_is_as_large_as_asked_for_and_no_noise_is_none() {
 fn networks_of_another_kind_are_refused() {
     let topology = Topology::s_ctrnn(5, 8, 2.0).unwrap();
     let (network, states) = initialize(&topology, 1, 3);
-    let new = |noise: &Noise| {
-        NetworkDriver::new(&network, states.mean(), &Scaling::identity(5), noise, 5, InstructionSet::best())
-    };
+    let new =
+        |noise: &Noise| NetworkDriver::new(&network, states.mean(), &Scaling::identity(5), noise, 5, &Engine::serial());
     let message = new(&Noise::Off).unwrap_err().to_string();
     assert!(message.contains("on 5 channels with a delay of 1; needed: 6 channels"), "{message}");
     assert!(driver(&Noise::Off).decide(&[0.0; 5]).is_err());

@@ -9,9 +9,9 @@ use rand::rngs::ChaCha8Rng;
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 use scrnn::dataset::{Dataset, Sequence};
+use scrnn::jobs::side_by_side;
 
 use crate::error::{Error, Result};
-use crate::parallel::in_parallel;
 use crate::reach::channels::REACHING;
 use crate::reach::stage::{CYCLE, CYCLES, PERIOD, POSITIONS, RETRACTION, Stage, samples_to_steps, touching_arm};
 use crate::reach::touching::{Cycle, TouchDetector};
@@ -109,7 +109,7 @@ pub fn demonstrate_with<T: Send>(
         return Err(Error::Setting { what: "the placement's error", found, needed: "0 to 0.02 m" });
     }
     let robot = nao::load_one_armed()?;
-    in_parallel(*sequences, threads, |sequence| demonstration(tutoring, &robot, seed, sequence, look))
+    side_by_side(*sequences, threads, |sequence, _| demonstration(tutoring, &robot, seed, sequence, look))
 }
 
 /// The demonstrations as sequences to learn, named after position and take, e.g. `2-07`.

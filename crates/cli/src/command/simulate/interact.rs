@@ -93,6 +93,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         Some(_) => Some(Film::new(&[("run", &arguments.run.display().to_string())])?),
         None => None,
     };
+    let engine = shared.engine()?;
     let mut trials = Vec::new();
     for trial in 0..u64::from(arguments.trials) {
         let seed = arguments.seed.wrapping_add(trial << 32);
@@ -101,12 +102,8 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
             None => random_order(BRANCHES, 0.5, seed),
         };
         let (initial_state, state) = arguments.start(&trained, &order)?;
-        let controller = Controller {
-            network: &network,
-            scaling: &checkpoint.scaling,
-            initial_state: state,
-            instruction_set: shared.instruction_set(),
-        };
+        let controller =
+            Controller { network: &network, scaling: &checkpoint.scaling, initial_state: state, engine: &engine };
         let mut interaction = Interaction::new(&order, &InteractionOptions::default(), seed)?;
         let mut deadline = arguments.regression.clock()?;
         if let Some(film) = &mut film {

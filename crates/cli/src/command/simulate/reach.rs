@@ -126,7 +126,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         &checkpoint.scaling,
         &noise,
         arguments.seed,
-        shared.instruction_set(),
+        &shared.engine()?,
     )?;
     let shift = arguments.shift_at.zip(arguments.to.map(|place| place.0));
     let samples = arguments.cycles as usize * CYCLE;

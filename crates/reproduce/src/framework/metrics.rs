@@ -1,17 +1,21 @@
 //! metrics.json: all numbers of a reproduction. docs/reproduction.md says what each key means.
 
 use scrnn::engine::InstructionSet;
+use scrnn_run::experiment::Experiment;
 use serde::Serialize;
 
-use super::study::{SeedResult, Summary, Verdict};
-use scrnn_run::experiment::Experiment;
+use super::comparison::Compared;
+use super::measure::Summary;
+use super::results::{JobResult, Results};
+use super::table::{self, Table};
+use super::verdict::Verdict;
 
 /// The file's name.
 pub const METRICS: &str = "metrics.json";
 
 /// All of it.
-#[derive(Debug, Serialize)]
-pub struct Metrics<F> {
+#[derive(Debug)]
+pub struct Metrics<'a, F> {
     /// Grows when a key changes its meaning.
     pub format: u32,
     /// Which experiment.
@@ -26,14 +30,55 @@ pub struct Metrics<F> {
     pub machine: Machine,
     /// From start to page.
     pub seconds: f64,
-    /// The first seed's experiments.
-    pub settings: Vec<Experiment>,
-    /// Each seed.
-    pub seeds: Vec<SeedResult<F>>,
-    /// Over seeds.
-    pub summary: Vec<Summary>,
     /// Goals.
     pub verdicts: Vec<Verdict>,
+    /// All jobs, and what was made of them.
+    pub results: &'a Results<F>,
+}
+
+/// The file's keys.
+#[derive(Serialize)]
+struct File<'a, F> {
+    format: u32,
+    experiment: &'static str,
+    preset: &'static str,
+    command: &'a str,
+    version: &'static str,
+    machine: &'a Machine,
+    seconds: f64,
+    settings: Vec<&'a Experiment>,
+    seeds: &'a [JobResult<F>],
+    summary: &'a [Summary],
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    comparisons: &'a [Compared],
+    #[serde(skip_serializing_if = "<[_]>::is_empty", serialize_with = "table::by_key")]
+    tables: &'a [Table],
+    times: &'a [Summary],
+    verdicts: &'a [Verdict],
+}
+
+impl<F: Serialize> Metrics<'_, F> {
+    /// As the file has it.
+    pub fn json(&self) -> String {
+        let results = self.results;
+        let file = File {
+            format: self.format,
+            experiment: self.experiment,
+            preset: self.preset,
+            command: &self.command,
+            version: self.version,
+            machine: &self.machine,
+            seconds: self.seconds,
+            settings: results.settings.iter().flatten().collect(),
+            seeds: &results.jobs,
+            summary: &results.summary,
+            comparisons: &results.comparisons,
+            tables: &results.tables,
+            times: &results.times,
+            verdicts: &self.verdicts,
+        };
+        serde_json::to_string_pretty(&file).expect("strings and numbers become JSON") + "\n"
+    }
 }
 
 /// A computer.

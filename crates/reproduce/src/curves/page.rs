@@ -1,9 +1,11 @@
 //! Figures and tables of the curves: those of 3.2, in the thesis' order.
 
-use scrnn::dataset::Dataset;
+use scrnn::analysis::clustering::Clustering;
 use scrnn::generation::Generated;
 
-use super::curves::{Findings, Material};
+use super::{Findings, Material};
+use crate::framework::JobResult;
+use crate::framework::shapes::two_units;
 use scrnn_pages::calibration_blocks;
 use scrnn_report::{Block, Chart, Figure, Mark, Panel, Section, Series, Sheet, Tone};
 
@@ -25,15 +27,17 @@ const TABLE_3_1: [[f64; 4]; 12] = [
 /// The thesis' Table 3.2: successful recognitions of 20.
 const TABLE_3_2: [usize; 12] = [17, 14, 11, 9, 11, 16, 9, 1, 12, 16, 9, 9];
 
-/// All sections.
-pub fn sections(findings: &Findings, material: &Material) -> Vec<Section> {
+/// All sections: of the first seed, and the initial states of all.
+pub fn sections(jobs: &[JobResult<Findings>], materials: &[Material]) -> Vec<Section> {
+    let (Some(first), Some(material)) = (jobs.first(), materials.first()) else { return Vec::new() };
+    let findings = &first.findings;
     let twelve = findings.patterns.len() <= 12;
     let mut sections = vec![data(material, twelve), closed_loop(findings, material, twelve)];
     if twelve {
         sections.push(variances(findings, material));
         sections.push(recognition(findings));
     }
-    sections.push(initial_states(findings, material, twelve));
+    sections.push(initial_states(jobs, materials, twelve));
     sections.push(Section { title: "One step ahead".into(), blocks: calibration_blocks(&findings.assessment) });
     sections
 }
@@ -257,83 +261,62 @@ fn recognition(findings: &Findings) -> Section {
     Section { title: "Recognition".into(), blocks: vec![Block::Sheet(table)] }
 }
 
-fn initial_states(findings: &Findings, material: &Material, twelve: bool) -> Section {
+/// Initial states by their noise, a panel for each seed.
+fn initial_states(jobs: &[JobResult<Findings>], materials: &[Material], twelve: bool) -> Section {
     let levels = ["noise 0.01", "0.03", "0.05", "0.07"];
-    let points: Vec<(f64, f64)> = material.plane.chunks_exact(2).map(|point| (point[0], point[1])).collect();
-    let series = (0..4).map(|level| {
-        let own: Vec<usize> = (0..points.len()).filter(|&s| material.levels[s] == level).collect();
-        let mark = match twelve {
-            true => Mark::Texts(own.iter().map(|s| (s + 1).to_string()).collect()),
-            false => Mark::Dots,
-        };
-        let points = own.into_iter().map(|s| points[s]).collect();
-        Series { name: levels[level].into(), tone: Tone::Level(level), mark, points }
-    });
-    let panel = Panel::spanning("", series.collect());
+    let panel = |(job, material): (&JobResult<Findings>, &Material)| {
+        let points: Vec<(f64, f64)> = material.plane.chunks_exact(2).map(|point| (point[0], point[1])).collect();
+        let series = (0..4).map(|level| {
+            let own: Vec<usize> = (0..points.len()).filter(|&s| material.levels[s] == level).collect();
+            let mark = match twelve {
+                true => Mark::Texts(own.iter().map(|s| (s + 1).to_string()).collect()),
+                false => Mark::Dots,
+            };
+            let points = own.into_iter().map(|s| points[s]).collect();
+            Series { name: levels[level].into(), tone: Tone::Level(level), mark, points }
+        });
+        let title = if jobs.len() > 1 { job.called() } else { String::new() };
+        Panel::spanning(title, series.collect())
+    };
     let chart = Chart {
-        columns: 1,
+        columns: jobs.len().clamp(1, 2),
         aspect: 1.6,
         x_label: "first component".into(),
         y_label: "second component".into(),
-        panels: vec![panel],
+        panels: jobs.iter().zip(materials).map(panel).collect(),
     };
-    let told = |found: &Option<scrnn::analysis::clustering::Clustering>| {
-        found.as_ref().map_or("not defined".to_owned(), |found| {
-            format!(
-                "{:.2} (shuffled labels {:.2} \u{b1} {:.2}, p = {:.4})",
-                found.silhouette, found.shuffled_mean, found.shuffled_deviation, found.p_value
-            )
-        })
-    };
-    let caption = format!(
-        "Each pattern's initial state in the plane of the first two principal components, which hold {:.0} % of their \
-         variance; colours and legend are the standard deviation of its noise. Silhouette by level of noise: {} in the plane, {} \
-         in all dimensions.",
-        100.0 * findings.plane_share,
-        told(&findings.clustering_plane),
-        told(&findings.clustering_all)
-    );
+    let caption = "Each pattern's initial state in the plane of the first two principal components; colours and legend are the \
+                   standard deviation of its noise.";
     let thesis = if twelve { "Fig. 3.5: four clusters by the variance of the noise, judged by eye." } else { "" };
-    let block = figure("initial-states", "Initial states", &caption, thesis, chart);
-    Section { title: "Initial states".into(), blocks: vec![block] }
-}
-
-/// The two units whose activations vary most while they do not vary alike.
-pub fn two_units(generated: &[Generated], units: usize) -> Option<(usize, usize)> {
-    let column = |i: usize| -> Vec<f64> {
-        generated.iter().flat_map(|one| one.contexts.iter().skip(i).step_by(units)).copied().collect()
+    let block = figure("initial-states", "Initial states", caption, thesis, chart);
+    let cells = |found: &Option<Clustering>| match found {
+        Some(found) => vec![
+            format!("{:.2}", found.silhouette),
+            format!("{:.2} \u{b1} {:.2}", found.shuffled_mean, found.shuffled_deviation),
+            format!("{:.4}", found.p_value),
+        ],
+        None => vec!["\u{2013}".to_owned(); 3],
     };
-    let columns: Vec<Vec<f64>> = (0..units).map(column).collect();
-    let spread = |i: usize| scrnn::evaluation::mean_and_deviation(&columns[i]).1;
-    let first = (0..units).max_by(|&a, &b| spread(a).total_cmp(&spread(b))).filter(|&i| columns[i].len() > 1)?;
-    let alike = |i: usize| scrnn::evaluation::correlation(&columns[first], &columns[i]).map_or(1.0, f64::abs);
-    let worth = |i: usize| spread(i) * (1.0 - alike(i));
-    let second = (0..units).filter(|&i| i != first).max_by(|&a, &b| worth(a).total_cmp(&worth(b)))?;
-    Some((first, second))
-}
-
-/// Channel `i` of a sequence over its steps.
-pub fn over_time(data: &Dataset, s: usize, i: usize, steps: usize) -> Vec<(f64, f64)> {
-    let sequence = &data.sequences()[s];
-    (0..steps.min(sequence.len())).map(|k| ((k + 1) as f64, sequence.sample(k)[i])).collect()
+    let rows = jobs.iter().map(|job| {
+        let findings = &job.findings;
+        let mut row = vec![job.called(), format!("{:.0} %", 100.0 * findings.plane_share)];
+        row.extend(cells(&findings.clustering_plane));
+        row.extend(cells(&findings.clustering_all));
+        row
+    });
+    let head = ["", "variance in the plane", "silhouette", "shuffled", "p", "all dimensions", "shuffled", "p"];
+    let sheet = Sheet {
+        caption: "Silhouette by level of noise, in the plane and in all dimensions".into(),
+        head: head.map(String::from).to_vec(),
+        rows: rows.collect(),
+        note: "1 apart, 0 mixed. Shuffled: mean \u{b1} sd over shuffled labels; p is the share of them that cluster as well.".into(),
+    };
+    Section { title: "Initial states".into(), blocks: vec![block, Block::Sheet(sheet)] }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_units_that_move_most_and_not_alike_are_chosen() {
-        let contexts = (0..50)
-            .flat_map(|k| {
-                let angle = f64::from(k);
-                [0.1 * angle.cos(), 0.9 * angle.sin(), 0.8 * angle.sin(), 0.5 * angle.cos()]
-            })
-            .collect();
-        let generated = Generated { contexts, ..Generated::default() };
-        assert_eq!(two_units(&[generated], 4), Some((1, 3)));
-        assert_eq!(two_units(&[Generated::default()], 4), None);
-    }
 
     #[test]
     fn the_thesis_tables_are_off_by_what_is_said_of_them() {

@@ -1,23 +1,23 @@
 //! An oscillator that is driven by noise which depends on its state (thesis 3.4).
 
+mod page;
+
 use scrnn::analysis::oscillation::Oscillation;
 use scrnn::dataset::Dataset;
-use scrnn::engine::Engine;
 use scrnn::evaluation::correlation;
 use scrnn::generation::{Feedback, Generated, GenerationOptions};
 use scrnn::recognition::{RecognitionOptions, recognize};
+use scrnn_report::Section;
+use scrnn_run::assessment::{self, Assessment, Predictions};
 use scrnn_tasks::limit_cycle::{self, State};
 use serde::Serialize;
 
-use super::curves::{CLOSED_LOOP, HELD_OUT, timely};
-use super::curves_page::{over_time, two_units};
-use super::preset::{self, Kind};
-use super::study::{Learned, Measure, SeedResult, Study, Verdict};
-use scrnn_pages::calibration_blocks;
-use scrnn_report::{Block, Chart, Figure, Panel, Section, Series, Sheet, Tone};
-use scrnn_run::assessment::{self, Assessment, Predictions};
-use scrnn_run::failure::Result;
+use crate::framework::preset::asset;
+use crate::framework::{CLOSED_LOOP, Condition, Desk, HELD_OUT, Job, Kind, Measure, Result, Results, Study, Verdict};
 
+/// The S-CTRNN of the noise-driven oscillator.
+const OSCILLATOR: Kind =
+    Kind { name: "S-CTRNN", suffix: "", presets: [asset!("limit_cycle.toml"), asset!("limit_cycle_fast.toml")] };
 /// Steps of the closed loop that is shown and compared.
 const STEPS: usize = 1000;
 /// Steps of the closed loops, and of the oscillator itself, whose swings are measured: 40 000 cycles from 60 sequences, which tell
@@ -70,14 +70,19 @@ impl Study for LimitCycle {
     type Findings = Findings;
     type Material = Material;
 
-    fn networks(&self) -> &'static [Kind] {
-        &[preset::LIMIT_CYCLE]
+    fn title(&self) -> &'static str {
+        "An oscillator driven by noise that depends on its state"
     }
 
-    fn evaluate(&self, networks: &[Learned], seed: u64, engine: &Engine) -> Result<(Findings, Material)> {
-        let learned = &networks[0];
+    fn conditions(&self, _beyond: bool) -> Vec<Condition> {
+        vec![Condition::only(&[OSCILLATOR])]
+    }
+
+    fn evaluate(&self, job: &Job<'_>, desk: &Desk<'_>) -> Result<(Findings, Material)> {
+        let &Job { networks, seed, .. } = job;
+        let (learned, engine) = (&networks[0], desk.engine());
         let (network, data) = (&learned.network, &learned.source.data);
-        let (delay, sequences) = (network.topology.delay(), data.sequences().len());
+        let (delay, sequences) = (network.topology().delay(), data.sequences().len());
         let steps = data.sequences().iter().map(|sequence| sequence.len()).max().unwrap_or(0);
         let make = |steps, seed| limit_cycle::generate(&limit_cycle::Options { sequences, steps }, seed);
         let (own, new) = (make(steps, seed)?, make(STEPS, seed + HELD_OUT)?);
@@ -90,8 +95,12 @@ impl Study for LimitCycle {
             initial_state_variance: learned.experiment.network.initial_state_variance,
             ..RecognitionOptions::default()
         };
-        let found = recognize(network, &learned.initial_states, &new.task.data, &options, engine)?;
-        let found: Vec<&[f64]> = found.iter().map(|found| found.trials[0].initial_state.as_slice()).collect();
+        let found: Vec<Vec<f64>> = desk.part("recognition", || {
+            desk.say("recognition of new sequences");
+            let found = recognize(network, &learned.initial_states, &new.task.data, &options, engine)?;
+            Ok(found.into_iter().map(|mut found| found.trials.swap_remove(0).initial_state).collect())
+        })?;
+        let found: Vec<&[f64]> = found.iter().map(Vec::as_slice).collect();
         let on_learned = assessment::open_loop(network, &learned.states(), data, engine)?;
         let on_new = assessment::open_loop(network, &found, &new.task.data, engine)?;
         let run = |steps, contexts| {
@@ -99,7 +108,7 @@ impl Study for LimitCycle {
                 GenerationOptions { steps, feedback: Feedback::closed(1, true), seed: seed + CLOSED_LOOP, contexts };
             assessment::run(network, &learned.states(), data, &options, engine)
         };
-        let (closed, long) = (run(STEPS, true)?, run(LONG, false)?);
+        let closed = run(STEPS, true)?;
 
         // The deviation of each predicted sample follows from the sample before: a recorded or a generated one.
         let agree = |generated: &[Generated], before: &dyn Fn(usize, usize) -> f64, steps: &dyn Fn(usize) -> usize| {
@@ -130,12 +139,13 @@ impl Study for LimitCycle {
             }),
             sd_correlation_open: agree(&on_learned, &|s, k| recorded(data, s, k), &|s| length(data, s)),
             sd_correlation_closed: agree(&closed, &before_own, &|_| STEPS),
-            network: swings(&long),
-            oscillator: swings_of(&make(LONG, seed + HELD_OUT)?.task.data),
+            network: desk.part("swings of the network on its own", || Ok(swings(&run(LONG, false)?)))?,
+            oscillator: desk
+                .part("swings of the oscillator", || Ok(swings_of(&make(LONG, seed + HELD_OUT)?.task.data)))?,
             learned: swings_of(data),
             assessment,
         };
-        let units = network.topology.context_units();
+        let units = network.topology().context_units();
         Ok((findings, Material { data: data.clone(), z: own.z, closed, units }))
     }
 
@@ -199,7 +209,8 @@ impl Study for LimitCycle {
         ]
     }
 
-    fn verdicts(&self, seeds: &[SeedResult<Findings>]) -> Vec<Verdict> {
+    fn verdicts(&self, results: &Results<Findings>) -> Vec<Verdict> {
+        let seeds = &results.jobs;
         vec![
             Verdict::every(seeds, "correlation of standard deviations, new sequences", "above 0.96", |seed| {
                 let found = seed.findings.sd_correlation_held_out;
@@ -219,16 +230,11 @@ impl Study for LimitCycle {
                 let met = lively >= 0.95 && all.iter().all(|off| off.is_some_and(|off| off.abs() <= 5.0));
                 (shown.join(", "), met)
             }),
-            timely(seeds, 120.0),
         ]
     }
 
-    fn sections(&self, seed: &SeedResult<Findings>, material: &Material) -> Vec<Section> {
-        let blocks = vec![time(material), phase(material), swings(&seed.findings)];
-        vec![
-            Section { title: "Closed loop".into(), blocks },
-            Section { title: "One step ahead".into(), blocks: calibration_blocks(&seed.findings.assessment) },
-        ]
+    fn sections(&self, results: &Results<Findings>, materials: &[Material]) -> Vec<Section> {
+        page::sections(&results.jobs, materials)
     }
 }
 
@@ -244,124 +250,19 @@ fn lively(findings: &Findings) -> f64 {
     count(&findings.network) / count(&findings.oscillator).max(1.0)
 }
 
-/// Fig. 3.7.
-fn time(material: &Material) -> Block {
-    let to = 300;
-    let closed = &material.closed[0];
-    let over = |values: &[f64]| -> Vec<(f64, f64)> { (0..to).map(|k| ((k + 2) as f64, values[k])).collect() };
-    let first = material.data.sequences()[0].sample(0)[0];
-    let before = std::iter::once(first).chain(closed.sample.iter().copied());
-    let truth: Vec<f64> = before.take(to).map(|y| standard_deviation(y).powi(2)).collect();
-    let wave = |title: &str, tone, points| {
-        let panel = Panel::spanning(title, vec![Series::line("", tone, points)]);
-        Panel { y: (-1.15, 1.15), ..panel }
-    };
-    let variances = vec![
-        Series::line("predicted", Tone::Ours, over(&closed.variance)),
-        Series::line("true, of the network's own output", Tone::Truth, over(&truth)),
-    ];
-    let panels = vec![
-        wave("training data", Tone::Data, over_time(&material.data, 0, 0, to)),
-        wave("output of the network on its own", Tone::Ours, over(&closed.sample)),
-        Panel::spanning("variance", variances).with_zero(),
-    ];
-    let chart = Chart { columns: 1, aspect: 3.6, x_label: "step".into(), y_label: String::new(), panels };
-    Block::Figure(Box::new(Figure {
-        file: "time".into(),
-        title: "Data, output and variance".into(),
-        caption: "300 steps of the first sequence, of the closed loop with noise of the predicted variance, and of that variance \
-                  beside the one that the oscillator would have at the network's output (3.12)."
-            .into(),
-        thesis: "Fig. 3.7: the output has the data's structure, and the predicted variance is close to the true one.".into(),
-        drawing: chart.into(),
-    }))
-}
-
-/// Fig. 3.8.
-fn phase(material: &Material) -> Block {
-    let steps = 800;
-    let phase_plane = |title: &str, tone, points: Vec<(f64, f64)>| {
-        let series = vec![Series::line("", tone, points)];
-        Panel { title: title.into(), x: (-1.15, 1.15), y: (-1.0, 1.0), series, failed: false }
-    };
-    let (data, z) = (&material.data.sequences()[0], &material.z.sequences()[0]);
-    let recorded = (0..steps.min(data.len())).map(|k| (data.sample(k)[0], z.sample(k)[0]));
-    let closed = &material.closed[0];
-    let mut panels = vec![
-        phase_plane("A: data", Tone::Data, recorded.collect()),
-        phase_plane(
-            "B: network",
-            Tone::Ours,
-            partners(State { y: data.sample(0)[0], z: z.sample(0)[0] }, &closed.sample[..steps]),
-        ),
-    ];
-    if let Some((a, b)) = two_units(&material.closed[..1], material.units) {
-        let contexts = closed.contexts.chunks_exact(material.units).take(steps).map(|c| (c[a], c[b])).collect();
-        panels.push(Panel::spanning(
-            format!("C: units {}, {}", a + 1, b + 1),
-            vec![Series::line("", Tone::Ours, contexts)],
-        ));
-    }
-    let chart = Chart { columns: 3, aspect: 1.0, x_label: String::new(), y_label: String::new(), panels };
-    Block::Figure(Box::new(Figure {
-        file: "phase".into(),
-        title: "Phase plots".into(),
-        caption: "z over y for the data and for the network's closed loop, and two of its context units. The network never sees z: \
-                  for its output z is computed by (3.10) from y, starting from that of the data."
-            .into(),
-        thesis: "Fig. 3.8: the output has the structure of the data, and the contexts share it.".into(),
-        drawing: chart.into(),
-    }))
-}
-
-/// y and z of a signal, z by (3.10) from the state before its first sample.
-fn partners(start: State, signal: &[f64]) -> Vec<(f64, f64)> {
-    let mut state = start;
-    let next = |&y: &f64| {
-        state = State { y, ..state.next() };
-        (state.y, state.z)
-    };
-    signal.iter().map(next).collect()
-}
-
-fn swings(findings: &Findings) -> Block {
-    let row = |name: &str, swings: &Option<Oscillation>| {
-        let cells = swings.as_ref().map_or(vec!["\u{2013}".to_owned(); 3], |o| {
-            vec![
-                format!("{:.3} \u{b1} {:.3}", o.amplitude, o.amplitude_deviation),
-                format!("{:.2} \u{b1} {:.2}", o.period, o.period_deviation),
-                o.cycles.to_string(),
-            ]
-        });
-        [vec![name.to_owned()], cells].concat()
-    };
-    Block::Sheet(Sheet {
-        caption: "Swings, mean \u{b1} sd from cycle to cycle".into(),
-        head: ["", "amplitude", "period in steps", "cycles"].map(String::from).to_vec(),
-        rows: vec![
-            row("the network on its own", &findings.network),
-            row("the oscillator", &findings.oscillator),
-            row("the learned sequences", &findings.learned),
-        ],
-        note: "A cycle lasts from one upward crossing of 0 to the next; its amplitude is half the distance between its highest and \
-               lowest value. Network and oscillator run for 50000 steps from each sequence's start; the learned sequences are too short \
-               to tell 5 % apart."
-            .into(),
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::framework::preset::Preset;
 
     #[test]
-    fn the_hidden_partner_is_found_again_from_what_is_seen() {
-        let data = limit_cycle::generate(&limit_cycle::Options { sequences: 1, steps: 300 }, 3).unwrap();
-        let (y, z) = (&data.task.data.sequences()[0], &data.z.sequences()[0]);
-        let start = State { y: y.sample(0)[0], z: z.sample(0)[0] };
-        let found = partners(start, &y.values()[1..]);
-        for (k, point) in found.iter().enumerate() {
-            assert_eq!(*point, (y.sample(k + 1)[0], z.sample(k + 1)[0]), "step {k}");
-        }
+    fn the_thesis_preset_has_the_settings_of_3_4() {
+        let experiment = OSCILLATOR.experiment(Preset::Thesis, 1, None, &[]).unwrap();
+        let group = &experiment.network.groups[0];
+        assert_eq!((group.units, group.time_constant, experiment.training.epochs), (10, 2.0, 500_000));
+        assert_eq!(experiment.network.initial_state_variance, 1.0);
+        let momentum = experiment.training.momentum.unwrap();
+        assert_eq!((momentum.rate, momentum.momentum), (1e-4, 0.9));
+        assert!(OSCILLATOR.experiment(Preset::Fast, 3, None, &[]).unwrap().network.variance);
     }
 }

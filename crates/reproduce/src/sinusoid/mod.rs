@@ -1,21 +1,23 @@
 //! A sine wave whose noise changes over time (thesis 3.3).
 
 use scrnn::dataset::Dataset;
-use scrnn::engine::Engine;
 use scrnn::evaluation::{correlation, half_mean_squared_error};
 use scrnn::generation::{Feedback, Generated, GenerationOptions};
-use serde::Serialize;
-
-use super::curves::{CLOSED_LOOP, HELD_OUT, timely};
-use super::curves_page::over_time;
-use super::preset::{self, Kind};
-use super::study::{Learned, Measure, SeedResult, Study, Verdict};
 use scrnn_pages::calibration_blocks;
 use scrnn_report::{Block, Chart, Figure, Panel, Section, Series, Tone};
 use scrnn_run::assessment::{self, Assessment, Predictions};
-use scrnn_run::failure::Result;
 use scrnn_tasks::{TaskName, make};
+use serde::Serialize;
 
+use crate::framework::preset::asset;
+use crate::framework::shapes::over_time;
+use crate::framework::{
+    CLOSED_LOOP, Condition, Desk, HELD_OUT, Job, JobResult, Kind, Measure, Result, Results, Study, Verdict,
+};
+
+/// The S-CTRNN of the sine wave.
+const WAVE: Kind =
+    Kind { name: "S-CTRNN", suffix: "", presets: [asset!("sinusoid.toml"), asset!("sinusoid_fast.toml")] };
 /// Steps of the closed loop.
 const STEPS: usize = 1000;
 
@@ -54,14 +56,19 @@ impl Study for Sinusoid {
     type Findings = Findings;
     type Material = Material;
 
-    fn networks(&self) -> &'static [Kind] {
-        &[preset::SINUSOID]
+    fn title(&self) -> &'static str {
+        "A sine wave with noise that changes over time"
     }
 
-    fn evaluate(&self, networks: &[Learned], seed: u64, engine: &Engine) -> Result<(Findings, Material)> {
-        let learned = &networks[0];
+    fn conditions(&self, _beyond: bool) -> Vec<Condition> {
+        vec![Condition::only(&[WAVE])]
+    }
+
+    fn evaluate(&self, job: &Job<'_>, desk: &Desk<'_>) -> Result<(Findings, Material)> {
+        let &Job { networks, seed, .. } = job;
+        let (learned, engine) = (&networks[0], desk.engine());
         let (network, data) = (&learned.network, &learned.source.data);
-        let delay = network.topology.delay();
+        let delay = network.topology().delay();
         let ideal = make(TaskName::Sinusoid, (1, STEPS + delay), seed, 1)?;
         let new = make(TaskName::Sinusoid, (1, STEPS), seed + HELD_OUT, 1)?;
         let options = GenerationOptions {
@@ -152,47 +159,71 @@ impl Study for Sinusoid {
         ]
     }
 
-    fn verdicts(&self, seeds: &[SeedResult<Findings>]) -> Vec<Verdict> {
-        vec![
-            Verdict::every(seeds, "correlation of standard deviations, closed loop", "above 0.99", |seed| {
-                let found = seed.findings.sd_correlation_closed;
-                (found.map_or("none".into(), |r| format!("{r:.4}")), found.is_some_and(|r| r > 0.99))
-            }),
-            timely(seeds, 30.0),
-        ]
+    fn verdicts(&self, results: &Results<Findings>) -> Vec<Verdict> {
+        vec![Verdict::every(&results.jobs, "correlation of standard deviations, closed loop", "above 0.99", |seed| {
+            let found = seed.findings.sd_correlation_closed;
+            (found.map_or("none".into(), |r| format!("{r:.4}")), found.is_some_and(|r| r > 0.99))
+        })]
     }
 
-    fn sections(&self, seed: &SeedResult<Findings>, material: &Material) -> Vec<Section> {
-        let (from, to) = (0, 150);
+    fn sections(&self, results: &Results<Findings>, materials: &[Material]) -> Vec<Section> {
+        let jobs = &results.jobs;
+        let (Some(first), Some(material)) = (jobs.first(), materials.first()) else { return Vec::new() };
+        let to = 150;
         let closed = |values: &[f64]| -> Vec<(f64, f64)> {
-            (from..to.min(values.len())).map(|k| ((k + 2) as f64, values[k])).collect()
+            (0..to.min(values.len())).map(|k| ((k + 2) as f64, values[k])).collect()
         };
         let wave = |title: &str, tone, points| {
             let panel = Panel::spanning(title, vec![Series::line("", tone, points)]);
             Panel { y: (-1.1, 1.1), ..panel }
         };
-        let variances = vec![
-            Series::line("predicted", Tone::Ours, closed(&material.closed.variance)),
-            Series::line("true", Tone::Truth, closed(&material.variances)),
-        ];
-        let panels = vec![
+        let variance = |(job, material): (&JobResult<Findings>, &Material)| {
+            let variances = vec![
+                Series::line("predicted", Tone::Ours, closed(&material.closed.variance)),
+                Series::line("true", Tone::Truth, closed(&material.variances)),
+            ];
+            let title = if jobs.len() > 1 { format!("variance, {}", job.called()) } else { "variance".to_owned() };
+            Panel::spanning(title, variances).with_zero()
+        };
+        let mut panels = vec![
             wave("training data", Tone::Data, over_time(&material.data, 0, 0, to)),
             wave("output of the network on its own", Tone::Ours, closed(&material.closed.sample)),
-            Panel::spanning("variance", variances).with_zero(),
         ];
+        panels.extend(jobs.iter().zip(materials).map(variance));
         let chart = Chart { columns: 1, aspect: 3.6, x_label: "step".into(), y_label: String::new(), panels };
         let figure = Figure {
             file: "time".into(),
             title: "Data, output and variance".into(),
             caption: "Six periods of the data, of the closed loop with noise of the predicted variance, and of that variance \
-                      beside the true one. Nobody told the network how the noise grows and falls."
+                      beside the true one, for each seed. Nobody told the network how the noise grows and falls."
                 .into(),
             thesis: "Fig. 3.6: the output has the noise of the data, and the predicted variance is close to the true one.".into(),
             drawing: chart.into(),
         };
         vec![
             Section { title: "Closed loop".into(), blocks: vec![Block::Figure(Box::new(figure))] },
-            Section { title: "One step ahead".into(), blocks: calibration_blocks(&seed.findings.assessment) },
+            Section { title: "One step ahead".into(), blocks: calibration_blocks(&first.findings.assessment) },
         ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::framework::preset::Preset;
+
+    #[test]
+    fn the_thesis_preset_has_the_settings_of_3_3() {
+        let experiment = WAVE.experiment(Preset::Thesis, 1, None, &[]).unwrap();
+        let group = &experiment.network.groups[0];
+        assert_eq!((group.units, group.time_constant, experiment.training.epochs), (10, 2.0, 100_000));
+        assert_eq!(experiment.network.initial_state_variance, 1.0);
+        let momentum = experiment.training.momentum.unwrap();
+        assert_eq!((momentum.rate, momentum.momentum), (1e-4, 0.9));
+        for preset in [Preset::Thesis, Preset::Fast] {
+            let experiment = WAVE.experiment(preset, 3, Some(7), &[]).unwrap();
+            assert_eq!((experiment.seed, experiment.data.seed, experiment.training.epochs), (3, Some(3), 7));
+            assert_eq!(serde_json::to_value(&experiment.data.scaling).unwrap(), "none");
+        }
     }
 }
