@@ -42,7 +42,7 @@ impl Training {
     /// the last is left out.
     pub fn time(&mut self, epochs: u64) -> Duration {
         let (mut seen, mut start, mut elapsed) = (0, Instant::now(), Duration::ZERO);
-        self.let _ = learner.run(&mut |_: &EpochReport, _: &Learner| {
+        let _ = self.learner.run(&mut |_: &EpochReport, _: &Learner| {
             if seen == 0 {
                 start = Instant::now();
             } else if seen == epochs {
