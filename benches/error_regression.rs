@@ -15,6 +15,7 @@ use std::time::Instant;
 
 use arguments::Arguments;
 use machine::{median, peak_gflops};
+use scrnn::engine::Engine;
 use scrnn::error_regression::{Ascent, ErrorRegression, ErrorRegressionOptions};
 use scrnn::initialization::initialize;
 use scrnn::topology::{Group, Prediction, Topology};
