@@ -11,7 +11,7 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use scrnn::engine::InstructionSet;
+use scrnn::engine::Engine;
 use scrnn::initialization::initialize;
 use scrnn::scaling::Scaling;
 use scrnn::topology::Topology;
@@ -36,8 +36,8 @@ fn simulation(criterion: &mut Criterion) {
     let scaling = Scaling::new(vec![0.0; 6], vec![1.0; 6]).expect("scales other than 0");
     group.bench_function("closed_loop", |bencher| {
         bencher.iter(|| {
-            let set = InstructionSet::best();
-            let driver = NetworkDriver::new(&network, states.mean(), &scaling, &Noise::Predicted, 1, set);
+            let engine = Engine::serial();
+            let driver = NetworkDriver::new(&network, states.mean(), &scaling, &Noise::Predicted, 1, &engine);
             let mut driver = driver.expect("a network on six channels");
             black_box(perform_unobserved(&performance(), &mut driver).expect("a stage with a robot"))
         });

@@ -71,7 +71,6 @@ impl Verdict {
                 Outcome::Finished => "finished",
                 Outcome::Stopped => "interrupted",
                 Outcome::Diverged(_) => "diverged",
-                _ => "ended",
             },
             epoch: learner.epoch(),
             nll: score.and_then(|score| score.nll),

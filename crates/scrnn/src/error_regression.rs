@@ -216,7 +216,7 @@ impl ErrorRegression {
     /// # Panics
     /// If that is further ahead than the options ask for.
     #[must_use]
-    pub fn foreseen_mean(&self, steps: usize) -> &[f64] {
+    pub fn forecast_mean(&self, steps: usize) -> &[f64] {
         self.check_ahead(steps);
         self.mean_of(self.length + 1 + steps)
     }
@@ -224,9 +224,9 @@ impl ErrorRegression {
     /// v of that sample; empty without variance units.
     ///
     /// # Panics
-    /// As [`ErrorRegression::foreseen_mean`].
+    /// As [`ErrorRegression::forecast_mean`].
     #[must_use]
-    pub fn foreseen_variance(&self, steps: usize) -> &[f64] {
+    pub fn forecast_variance(&self, steps: usize) -> &[f64] {
         self.check_ahead(steps);
         let n_v = self.next_variance.len() / (1 + self.options.ahead);
         &self.next_variance[steps * n_v..(steps + 1) * n_v]
@@ -235,9 +235,9 @@ impl ErrorRegression {
     /// The context that predicts it, N_C values.
     ///
     /// # Panics
-    /// As [`ErrorRegression::foreseen_mean`].
+    /// As [`ErrorRegression::forecast_mean`].
     #[must_use]
-    pub fn foreseen_context(&self, steps: usize) -> &[f64] {
+    pub fn forecast_context(&self, steps: usize) -> &[f64] {
         self.check_ahead(steps);
         &self.states[(self.length + 1 + steps) * self.packed.state_stride..][..self.packed.n_c]
     }
@@ -252,7 +252,7 @@ impl ErrorRegression {
     /// # Panics
     /// If there is no such step.
     #[must_use]
-    pub fn postdicted_mean(&self, step: usize) -> &[f64] {
+    pub fn smoothed_mean(&self, step: usize) -> &[f64] {
         assert!(step <= self.length, "step {step} of a window of {}", self.length);
         self.mean_of(step + 1)
     }
@@ -382,10 +382,10 @@ impl ErrorRegression {
             precisions: &mut self.precisions,
         }
         .score(simd, self.floor);
-        if self.options.heeded.iter().any(|share| *share != 1.0) {
+        if self.options.mask.iter().any(|share| *share != 1.0) {
             let lists = [&mut self.mean_delta, &mut self.variance_delta, &mut self.terms, &mut self.squares];
             for row in lists.into_iter().flat_map(|list| list.chunks_exact_mut(n_x).take(self.length)) {
-                row.iter_mut().zip(&self.options.heeded).for_each(|(value, share)| *value *= share);
+                row.iter_mut().zip(&self.options.mask).for_each(|(value, share)| *value *= share);
             }
         }
         (self.terms[..len].iter().sum(), self.squares[..len].iter().sum())

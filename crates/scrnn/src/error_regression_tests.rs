@@ -64,7 +64,7 @@ fn plain(
     first: usize,
     steps: usize,
     shares: &[f64],
-    heeded: &[f64],
+    mask: &[f64],
 ) -> f64 {
     let delay = network.topology.delay();
     let mut state = Plain::new(network, tail);
@@ -82,7 +82,7 @@ fn plain(
                 Some(&v) => ln_gaussian(*target, state.y[i], v),
                 None => -0.5 * (target - state.y[i]).powi(2),
             };
-            sum += heeded[i] * term;
+            sum += mask[i] * term;
         }
     }
     sum
@@ -90,7 +90,7 @@ fn plain(
 
 #[test]
 fn the_gradient_at_the_tail_agrees_with_central_differences() {
-    for (delay, variance, count, shares, heeded) in [
+    for (delay, variance, count, shares, mask) in [
         (1, true, 30, [0.0; 3], [1.0; 3]),
         (1, false, 5, [0.0; 3], [1.0; 3]),
         (2, true, 30, [0.25, 0.0, 1.0], [1.0; 3]),
@@ -102,7 +102,7 @@ fn the_gradient_at_the_tail_agrees_with_central_differences() {
             window: 12,
             iterations: 0,
             sensed_in_window: shares.to_vec(),
-            heeded: heeded.to_vec(),
+            mask: mask.to_vec(),
             ..ErrorRegressionOptions::new(3)
         };
         for set in InstructionSet::available() {
@@ -114,7 +114,7 @@ fn the_gradient_at_the_tail_agrees_with_central_differences() {
             let first = count - delay - steps;
             let before = regression.mean[3..3 * (delay + 1)].to_vec();
             let (ln_likelihood, gradient) = set.run(Evaluate(&mut regression));
-            let at = |tail: &[f64]| plain(&network, tail, &before, first, steps, &shares, &heeded);
+            let at = |tail: &[f64]| plain(&network, tail, &before, first, steps, &shares, &mask);
             assert!((ln_likelihood - at(&tail)).abs() < 1e-10 * (1.0 + ln_likelihood.abs()));
             for i in 0..tail.len() {
                 let moved = |by: f64| {
@@ -276,7 +276,7 @@ fn senseless_requests_are_refused_and_leave_no_trace() {
 }
 
 #[test]
-fn what_is_foreseen_is_what_generation_gives_once_samples_run_out() {
+fn what_is_forecast_is_what_generation_gives_once_samples_run_out() {
     for (delay, count) in [(1, 9), (3, 2), (3, 3), (3, 4), (5, 30)] {
         let network = network(delay, true, fast_and_slow());
         let (iterations, ahead) = (0, 8);
@@ -303,11 +303,11 @@ fn what_is_foreseen_is_what_generation_gives_once_samples_run_out() {
         for steps in 0..=ahead {
             let row = count - delay + steps;
             let own = |list: &[f64], size: usize| list[row * size..(row + 1) * size].to_vec();
-            let found = regression.foreseen_mean(steps);
+            let found = regression.forecast_mean(steps);
             assert!(close(found, &own(&generated.mean, 3)), "delay {delay}, {count} samples, {steps} ahead: {found:?}");
-            assert!(close(regression.foreseen_variance(steps), &own(&generated.variance, 3)));
-            assert!(close(regression.foreseen_context(steps), &own(&generated.contexts, 13)));
+            assert!(close(regression.forecast_variance(steps), &own(&generated.variance, 3)));
+            assert!(close(regression.forecast_context(steps), &own(&generated.contexts, 13)));
         }
-        assert_eq!(regression.foreseen_mean(0), regression.mean());
+        assert_eq!(regression.forecast_mean(0), regression.mean());
     }
 }

@@ -280,7 +280,7 @@ pub fn window(materials: &[&Material]) -> Option<Figure> {
     let (from, to) = (centre - AROUND.0, centre + AROUND.1);
     let mut columns = Vec::new();
     for (word, now) in [("before", centre - APART), ("modification", centre), ("after", centre + APART)] {
-        // Each sample as the last window that held it left it, or as it is foreseen.
+        // Each sample as the last window that held it left it, or as it is forecast.
         let held = |sample: usize| -> Option<Held<'_>> {
             let first = |k: usize| k + 1 - snapshots[k].window;
             let k = (0..=now).rev().find(|&k| first(k) <= sample && sample - first(k) < snapshots[k].means.len())?;
@@ -331,7 +331,7 @@ pub fn window(materials: &[&Material]) -> Option<Figure> {
         "window",
         "The window before, during and after a modification",
         "What the network holds of past and future at three moments around the largest jump. Between the two vertical lines lies the \
-         window; lines are the past as it stands at that moment, dots what is foreseen."
+         window; lines are the past as it stands at that moment, dots the forecast."
             .into(),
         "Fig. 5.10: at the modification the past in the window is overwritten, its error vanishes, and the future turns to the \
          other side; the past before the window stays.",

@@ -71,7 +71,7 @@ impl Regression {
             subject.desk.part(what, || subject.regressed(what, state, &subject.regression(options), 1))
         };
         let mut without_arm = default.clone();
-        without_arm.heeded[ARM].fill(0.0);
+        without_arm.mask[ARM].fill(0.0);
         Ok(Self {
             default: regress("error regression", default.clone())?,
             thesis: regress("error regression at the thesis' rate", thesis(subject.data.channels().len()))?,

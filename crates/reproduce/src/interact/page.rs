@@ -10,7 +10,7 @@ use scrnn_report::{Block, Chart, Figure, Panel, Section, Series, Sheet, Tone};
 pub fn sections(results: &Results<Findings>, materials: &[&Material]) -> Vec<Section> {
     let mut sections = vec![
         Section {
-            title: "Two ways to treat what cannot be foreseen".into(),
+            title: "Two ways to treat what cannot be predicted".into(),
             blocks: vec![
                 Block::Figure(Box::new(figures::initial_states(materials))),
                 Block::Figure(Box::new(figures::on_its_own(materials))),

@@ -275,10 +275,10 @@ impl Subject<'_> {
                     next.extend_from_slice(regression.mean());
                 }
                 if k + 1 == delay {
-                    (0..delay - 1).for_each(|steps| ahead.extend_from_slice(regression.foreseen_mean(steps)));
+                    (0..delay - 1).for_each(|steps| ahead.extend_from_slice(regression.forecast_mean(steps)));
                 }
                 if k + 1 >= delay && k + delay < sequence.len() {
-                    ahead.extend_from_slice(regression.foreseen_mean(delay - 1));
+                    ahead.extend_from_slice(regression.forecast_mean(delay - 1));
                 }
             }
             means.push(next);

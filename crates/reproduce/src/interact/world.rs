@@ -103,10 +103,10 @@ impl Subject<'_> {
         let followed = self.follow(state, &options, &mut interaction, |regression| {
             let window = regression.window();
             let past = 0..window;
-            let mut means: Vec<Vec<f64>> = past.clone().map(|k| regression.postdicted_mean(k).to_vec()).collect();
+            let mut means: Vec<Vec<f64>> = past.clone().map(|k| regression.smoothed_mean(k).to_vec()).collect();
             let mut contexts: Vec<Vec<f64>> = past.map(|k| regression.context(k).to_vec()).collect();
-            means.extend((0..=AHEAD).map(|k| regression.foreseen_mean(k).to_vec()));
-            contexts.extend((0..=AHEAD).map(|k| regression.foreseen_context(k).to_vec()));
+            means.extend((0..=AHEAD).map(|k| regression.forecast_mean(k).to_vec()));
+            contexts.extend((0..=AHEAD).map(|k| regression.forecast_context(k).to_vec()));
             snapshots.push(Snapshot { window, means, contexts, tail: regression.tail().to_vec() });
         })?;
         Ok((followed, snapshots))

@@ -36,7 +36,7 @@ pub struct ErrorRegressionOptions {
     pub sensed_in_window: Vec<f64>,
     /// Share of each channel's errors in ln L_reg: 0 does not heed a channel, e.g. that of a joint which the network moves
     /// itself, and which therefore always is where it was predicted.
-    pub heeded: Vec<f64>,
+    pub mask: Vec<f64>,
     /// Samples to predict beyond the next one.
     pub ahead: usize,
 }
@@ -53,7 +53,7 @@ impl ErrorRegressionOptions {
             max_norm: None,
             sensed: vec![1.0; channels],
             sensed_in_window: vec![0.0; channels],
-            heeded: vec![1.0; channels],
+            mask: vec![1.0; channels],
             ahead: 0,
         }
     }
@@ -82,7 +82,7 @@ impl ErrorRegressionOptions {
         for (what, shares) in [
             ("the sensed shares", &self.sensed),
             ("the window's shares", &self.sensed_in_window),
-            ("the heeded shares", &self.heeded),
+            ("the mask", &self.mask),
         ] {
             if shares.len() != channels {
                 return Err(Error::Length { what: what.to_owned(), found: shares.len(), needed: channels });

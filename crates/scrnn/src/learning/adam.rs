@@ -6,12 +6,12 @@
 //! ```
 //!
 //! before which weights w <- (1 - rate(n) decay) w if decay is above 0 (decoupled weight decay, Loshchilov and Hutter 2019).
-//! Initial states move in [`Coordinates`] that are not stiff, however narrow the prior. Between the first update of an epoch and
+//! Initial states move in [`NonCentred`] form that are not stiff, however narrow the prior. Between the first update of an epoch and
 //! the last, z is what is kept, and u_0 follows it and the mean where a batch asks for it: so an update costs what its batch costs.
 
 use std::ops::Range;
 
-use super::coordinates::Coordinates;
+use super::non_centred::NonCentred;
 use super::plan::Adam;
 use super::state::Fields;
 use crate::initial_states::InitialStates;
@@ -81,7 +81,7 @@ pub(super) struct AdamRule {
     epochs: u64,
     /// The average of T N_O over sequences.
     terms: f64,
-    coordinates: Coordinates,
+    non_centred: NonCentred,
     scratch: Vec<f64>,
     z: Vec<f64>,
 }
@@ -105,7 +105,7 @@ impl AdamRule {
             mean: Moments::new(states.mean().len()),
             epochs,
             terms: terms / states.sequences() as f64,
-            coordinates: Coordinates::new(topology, variance),
+            non_centred: NonCentred::new(topology, variance),
             scratch: vec![0.0; parameters.max(states.values().len())],
             z: vec![0.0; states.values().len()],
         }
@@ -136,7 +136,7 @@ impl AdamRule {
 
     /// Takes z up, before the first update of an epoch.
     pub fn begin_epoch(&mut self, states: &InitialStates) {
-        self.coordinates.read(states, &mut self.z);
+        self.non_centred.read(states, &mut self.z);
     }
 
     /// Brings u_0 of a batch to where z and the mean are.
@@ -144,13 +144,13 @@ impl AdamRule {
         let units = states.mean().len();
         for run in runs {
             let z = &self.z[run.sequence * units..(run.sequence + 1) * units];
-            self.coordinates.write_one(z, run.sequence, states);
+            self.non_centred.write_one(z, run.sequence, states);
         }
     }
 
     /// Brings u_0 of all sequences there, after the last update of an epoch.
     pub fn end_epoch(&self, states: &mut InitialStates) {
-        self.coordinates.write(&self.z, states);
+        self.non_centred.write(&self.z, states);
     }
 
     /// One update of weights, mean, and z of a batch, from the gradients of ln L_out over its sequences.
@@ -187,7 +187,7 @@ impl AdamRule {
             let z = &mut self.z[own.clone()];
             let scratch = &mut self.scratch[..units];
             for (i, (out, g)) in scratch.iter_mut().zip(initial).enumerate() {
-                *out = self.coordinates.slope(i, *g, z[i]) / self.terms;
+                *out = self.non_centred.slope(i, *g, z[i]) / self.terms;
             }
             self.initial.ascend_range(own, &adam, met, own_rate, scratch, z);
         }

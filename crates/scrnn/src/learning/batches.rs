@@ -126,7 +126,7 @@ impl Batches {
     }
 
     /// The first sequence whose values are not finite.
-    pub fn sequence_without_numbers(&self) -> Option<usize> {
+    pub fn non_finite_sequence(&self) -> Option<usize> {
         (0..self.ln_likelihoods.len()).find(|&sequence| !self.has_numbers(sequence))
     }
 
@@ -135,7 +135,7 @@ impl Batches {
     }
 
     /// The gradient that is not finite.
-    pub fn gradient_without_numbers(&self) -> Option<&Gradients> {
+    pub fn non_finite_gradient(&self) -> Option<&Gradients> {
         self.broken.as_ref()
     }
 

@@ -1,10 +1,10 @@
 //! L-BFGS ([`quasi_newton`](crate::quasi_newton)) on ln L_all per step and channel, over all sequences at once.
 //!
-//! A step must gain enough, so that ln L_all never falls. Initial states move in [`Coordinates`], as Adam's do. The pairs are all
+//! A step must gain enough, so that ln L_all never falls. Initial states move in [`NonCentred`] form, as Adam's do. The pairs are all
 //! that is remembered from one update to the next; a checkpoint holds those that there are, in rows.
 
 use super::batches::Batches;
-use super::coordinates::Coordinates;
+use super::non_centred::NonCentred;
 use super::plan::Lbfgs;
 use super::state::Fields;
 use super::state::OptimiserState;
@@ -32,7 +32,7 @@ pub(super) struct LbfgsRule {
     pub step: f64,
     /// 1 when no step was found that gains anything; then nothing moves any more.
     converged: f64,
-    coordinates: Coordinates,
+    non_centred: NonCentred,
     /// Units with an initial state each.
     units: usize,
     shared: usize,
@@ -56,7 +56,7 @@ impl LbfgsRule {
             next: 0.0,
             step: 1.0,
             converged: 0.0,
-            coordinates: Coordinates::new(topology, variance),
+            non_centred: NonCentred::new(topology, variance),
             units: topology.context_units(),
             shared,
             terms,
@@ -99,7 +99,7 @@ impl LbfgsRule {
             self.step = search.step;
             self.attempt(batches, parameters, states);
             let gain = self.value(&self.tried, batches) - here;
-            let sound = batches.gradient_without_numbers().is_none();
+            let sound = batches.non_finite_gradient().is_none();
             let next = search.judge(if sound { gain } else { f64::NAN }, || {
                 self.take_gradient(Point::There, batches);
                 dot(&self.gradient_there, &self.direction)
@@ -133,7 +133,7 @@ impl LbfgsRule {
         shared.copy_from_slice(parameters.as_slice());
         let (z, mean) = rest.split_at_mut(states.values().len());
         mean.copy_from_slice(states.mean());
-        self.coordinates.read(states, z);
+        self.non_centred.read(states, z);
     }
 
     /// The network of theta.
@@ -142,13 +142,13 @@ impl LbfgsRule {
         parameters.as_mut_slice().copy_from_slice(shared);
         let (z, mean) = rest.split_at(states.values().len());
         states.mean_mut().copy_from_slice(mean);
-        self.coordinates.write(z, states);
+        self.non_centred.write(z, states);
     }
 
     /// ln L_all per step and channel, but for a constant.
     fn value(&self, theta: &[f64], batches: &Batches) -> f64 {
         let z = &theta[self.shared..theta.len() - self.units];
-        (batches.ln_likelihood() - 0.5 * self.coordinates.pull() * dot(z, z)) / self.terms
+        (batches.ln_likelihood() - 0.5 * self.non_centred.pull() * dot(z, z)) / self.terms
     }
 
     /// The gradient of [`Self::value`] in theta, from d ln L_out / d (theta_share, u_0).
@@ -166,7 +166,7 @@ impl LbfgsRule {
         for (index, (g, z)) in of_sequences[self.shared..].iter_mut().zip(&theta[self.shared..end]).enumerate() {
             let i = index % self.units;
             of_mean[i] += *g;
-            *g = self.coordinates.slope(i, *g, *z);
+            *g = self.non_centred.slope(i, *g, *z);
         }
         gradient.iter_mut().for_each(|g| *g /= self.terms);
     }

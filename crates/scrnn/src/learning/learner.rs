@@ -62,7 +62,6 @@ impl<F: FnMut(&EpochReport, &Learner) -> ControlFlow<()>> Observer for F {
 /// How a training ended. Divergence is an outcome and no error: whoever ignores it goes on with a network that never learned.
 #[must_use = "a training may have diverged or been stopped"]
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub enum Outcome {
     /// All epochs are done.
     Finished,
@@ -370,9 +369,9 @@ impl Learner {
 
     fn divergence(&self) -> Option<Divergence> {
         let State { network, initial_states, epoch, .. } = &self.state;
-        let mut divergence = if let Some(s) = self.batches.sequence_without_numbers() {
+        let mut divergence = if let Some(s) = self.batches.non_finite_sequence() {
             Divergence::in_sequence(*epoch, network, initial_states, &self.data, s)
-        } else if let Some(gradients) = self.batches.gradient_without_numbers() {
+        } else if let Some(gradients) = self.batches.non_finite_gradient() {
             Divergence::in_gradient(*epoch, gradients)
         } else {
             Divergence::of_likelihood(*epoch, self.least_likely(), self.rise()?)

@@ -4,12 +4,12 @@
 
 mod adam;
 mod batches;
-mod coordinates;
 mod divergence;
 mod guard;
 mod lbfgs;
 mod learner;
 mod momentum;
+mod non_centred;
 mod plan;
 mod state;
 

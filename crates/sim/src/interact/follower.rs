@@ -36,7 +36,7 @@ pub struct Controller<'a> {
 pub fn with_own_arm(mut options: ErrorRegressionOptions) -> ErrorRegressionOptions {
     for channel in ARM {
         options.sensed[channel] = 0.0;
-        options.heeded[channel] = 0.0;
+        options.mask[channel] = 0.0;
     }
     options
 }

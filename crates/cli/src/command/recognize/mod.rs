@@ -76,7 +76,7 @@ pub struct Arguments {
     #[arg(long)]
     best: bool,
     /// Write the best initial states, for `scrnn generate --initial-state`; with --online, each sample as predicted and as
-    /// postdicted
+    /// smoothed
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
     /// With --observed: write the sequences with their rest as predicted

@@ -1,4 +1,4 @@
-//! Initial states in coordinates that no prior makes stiff.
+//! The non-centred parametrisation of initial states, which no prior makes stiff.
 //!
 //! ```text
 //! u_0 = mean + s z,   s = min(sigma_IS, 1)
@@ -13,14 +13,14 @@ use crate::topology::Topology;
 
 /// The scale of z, and which units have one.
 #[derive(Debug, Clone)]
-pub(super) struct Coordinates {
+pub(super) struct NonCentred {
     s: f64,
     /// (s / sigma_IS)^2.
     pull: f64,
     learns: Vec<bool>,
 }
 
-impl Coordinates {
+impl NonCentred {
     /// Those of a prior with `variance`, sigma_IS^2.
     pub fn new(topology: &Topology, variance: f64) -> Self {
         let s = variance.sqrt().min(1.0);
@@ -71,11 +71,11 @@ mod tests {
     use crate::topology::{Group, Prediction};
 
     #[test]
-    fn states_come_back_from_their_coordinates_and_follow_the_mean() {
+    fn states_come_back_from_z_and_follow_the_mean() {
         let groups = vec![Group::full("context", 2, 2.0), Group::fast(1, 2.0)];
         let topology = Topology::new(1, 1, groups, Prediction::Mean).unwrap();
         for (variance, s) in [(0.25, 0.5), (100.0, 1.0)] {
-            let coordinates = Coordinates::new(&topology, variance);
+            let coordinates = NonCentred::new(&topology, variance);
             let mut states = InitialStates::zeros(&topology, 2);
             states.values_mut().copy_from_slice(&[0.5, -1.0, 0.0, 0.25, 2.0, 0.0]);
             states.mean_mut().copy_from_slice(&[0.25, 0.5, 0.0]);
