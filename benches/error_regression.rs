@@ -59,12 +59,11 @@ impl Case {
     fn seconds(&self, arguments: &Arguments, count: usize) -> Vec<f64> {
         let (network, states) = initialize(&self.topology, 1, 1);
         let channels = self.topology.channels();
-        let options = ErrorRegressionOptions {
-            window: self.window,
-            iterations: self.iterations,
-            ascent: Ascent::Adam { rate: 0.01 },
-            ..ErrorRegressionOptions::new(channels)
-        };
+        let options = ErrorRegressionOptions::with(channels, |it| {
+            it.window = self.window;
+            it.iterations = self.iterations;
+            it.ascent = Ascent::Adam { rate: 0.01 };
+        });
         let regression = ErrorRegression::new(
             &network,
             states.sequence(0),

@@ -66,7 +66,10 @@ fn main() {
 
 /// Seconds of one recognition.
 fn seconds(network: &Network, learned: &InitialStates, data: &Dataset, engine: &Engine, epochs: u64) -> f64 {
-    let options = RecognitionOptions { starts: STARTS, epochs, ..RecognitionOptions::default() };
+    let options = RecognitionOptions::with(|it| {
+        it.starts = STARTS;
+        it.epochs = epochs;
+    });
     let start = Instant::now();
     let results = recognize(network, learned, data, &options, engine).expect("data made for the network");
     assert_eq!(results.len(), data.sequences().len());

@@ -94,11 +94,28 @@ fn data() -> Dataset {
 #[test]
 fn learning_and_recognition_compute_on_whatever_backend_they_get() {
     let topology = Topology::s_ctrnn(1, 3, 2.0).unwrap();
-    let in_batches = Optimiser::Adam(Adam { batch_size: 2, ..Adam::default() });
-    let momentum = Optimiser::Momentum(Momentum { rate: 0.01, ..Momentum::default() });
-    for (optimiser, lbfgs) in [(in_batches, Some(Lbfgs { share: 0.2, memory: 3 })), (momentum, None)] {
+    let in_batches = Optimiser::Adam(Adam::with(|it| {
+        it.batch_size = 2;
+    }));
+    let momentum = Optimiser::Momentum(Momentum::with(|it| {
+        it.rate = 0.01;
+    }));
+    for (optimiser, lbfgs) in [
+        (
+            in_batches,
+            Some(Lbfgs::with(|it| {
+                it.share = 0.2;
+                it.memory = 3;
+            })),
+        ),
+        (momentum, None),
+    ] {
         let learn = |backend: &dyn Backend| {
-            let plan = Plan { epochs: 15, optimiser: optimiser.clone(), lbfgs: lbfgs.clone(), ..Plan::default() };
+            let plan = Plan::with(|it| {
+                it.epochs = 15;
+                it.optimiser = optimiser.clone();
+                it.lbfgs = lbfgs.clone();
+            });
             let (network, states) = initialize(&topology, 3, 7);
             let mut learner = Learner::new(network, states, &data(), plan, backend).unwrap();
             let mut history = Vec::new();
@@ -106,7 +123,10 @@ fn learning_and_recognition_compute_on_whatever_backend_they_get() {
                 history.push(report.ln_likelihood);
                 ControlFlow::Continue(())
             });
-            let options = RecognitionOptions { starts: 3, epochs: 10, ..RecognitionOptions::default() };
+            let options = RecognitionOptions::with(|it| {
+                it.starts = 3;
+                it.epochs = 10;
+            });
             let found = recognize(learner.network(), learner.initial_states(), &data(), &options, backend).unwrap();
             history.extend(found.iter().flat_map(|one| one.trials.iter().map(|trial| trial.ln_likelihood)));
             (learner.numerics().to_owned(), history)

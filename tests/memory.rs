@@ -72,8 +72,13 @@ fn a_training_takes_the_bytes_that_are_promised_whatever_the_number_of_batches()
     for threads in [1, 2] {
         let engine = Engine::new(threads, InstructionSet::best()).unwrap();
         for batches in [1, 10, 500] {
-            let options = Adam { batch_size: sequences / batches, ..Adam::default() };
-            let plan = Plan { epochs: 10, optimiser: Optimiser::Adam(options), ..Plan::default() };
+            let options = Adam::with(|it| {
+                it.batch_size = sequences / batches;
+            });
+            let plan = Plan::with(|it| {
+                it.epochs = 10;
+                it.optimiser = Optimiser::Adam(options);
+            });
             let region = Region::new(ALLOCATOR);
             let (network, states) = initialize(&topology, sequences, 1);
             let mut learner = Learner::new(network, states, &data, plan, &engine).unwrap();
@@ -94,13 +99,20 @@ fn after_the_first_epochs_two_threads_allocate_nothing_either() {
     let data = waves(20, 60);
     let topology = Topology::new(2, 1, vec![scrnn::topology::Group::full("", 9, 2.0)], Prediction::Mean).unwrap();
     for optimiser in [
-        Optimiser::Momentum(Momentum { prior: PriorStep::Thesis, ..Momentum::default() }),
+        Optimiser::Momentum(Momentum::with(|it| {
+            it.prior = PriorStep::Thesis;
+        })),
         Optimiser::Momentum(Momentum::default()),
         Optimiser::Adam(Adam::default()),
-        Optimiser::Adam(Adam { batch_size: 7, ..Adam::default() }),
+        Optimiser::Adam(Adam::with(|it| {
+            it.batch_size = 7;
+        })),
     ] {
         let (network, states) = initialize(&topology, 20, 1);
-        let plan = Plan { epochs: 1000, optimiser: optimiser.clone(), ..Plan::default() };
+        let plan = Plan::with(|it| {
+            it.epochs = 1000;
+            it.optimiser = optimiser.clone();
+        });
         let mut learner = Learner::new(network, states, &data, plan, &engine).unwrap();
         let _ = learner.run(&mut until(3));
         // The test's own surroundings allocate now and then: the least of three counts. The queue of the thread pool takes a block for

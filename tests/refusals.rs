@@ -76,9 +76,13 @@ fn learning_and_recognising_ask_for_what_belongs_to_them() {
     let engine = Engine::new(1, InstructionSet::Portable).unwrap();
     let (network, states) = network();
     let one = InitialStates::zeros(&network.topology(), 1);
-    let plan = Plan { epochs: 10, ..Plan::default() };
+    let plan = Plan::with(|it| {
+        it.epochs = 10;
+    });
     refused(Learner::new(network.clone(), one, &waves(), plan, &engine), &["initial states", "1", "2"]);
-    let options = RecognitionOptions { warm_starts: vec![], ..RecognitionOptions::default() };
+    let options = RecognitionOptions::with(|it| {
+        it.warm_starts = vec![];
+    });
     refused(recognize(&network, &states, &waves(), &options, &engine), &["empty", "at least one kind"]);
 }
 
@@ -88,7 +92,11 @@ fn a_recognition_whose_steps_leave_the_numbers_keeps_the_best_start() {
     let (mut network, states) = network();
     // A variance that follows the context without bounds: far out it overflows.
     network.block_mut(Block::VarianceFromContext).fill(300.0);
-    let options = RecognitionOptions { starts: 4, epochs: 20, rate: 1e3, ..RecognitionOptions::default() };
+    let options = RecognitionOptions::with(|it| {
+        it.starts = 4;
+        it.epochs = 20;
+        it.rate = 1e3;
+    });
     for found in recognize(&network, &states, &waves(), &options, &engine).unwrap() {
         for trial in &found.trials {
             assert!(trial.ln_likelihood.is_finite() || trial.ln_likelihood == f64::NEG_INFINITY, "{trial:?}");
@@ -106,7 +114,10 @@ fn a_gradient_beyond_all_numbers_is_a_divergence_that_names_its_block() {
     network.block_mut(Block::VarianceBias).fill(-709.0);
     let near = |name: &str| Sequence::new(name, 2, (0..120).map(|k| 0.05 + 1e-4 * f64::from(k % 7)).collect()).unwrap();
     let data = Dataset::new(vec!["a".into(), "b".into()], vec![near("one"), near("two")]).unwrap();
-    let plan = Plan { epochs: 3, optimiser: Optimiser::Adam(Adam::default()), ..Plan::default() };
+    let plan = Plan::with(|it| {
+        it.epochs = 3;
+        it.optimiser = Optimiser::Adam(Adam::default());
+    });
     let mut learner = Learner::new(network, states, &data, plan, &engine).unwrap();
     let ended = learner.run(&mut |_: &EpochReport, _: &Learner| ControlFlow::Continue(()));
     let Outcome::Diverged(divergence) = ended else { panic!("did not diverge") };
@@ -135,8 +146,12 @@ fn a_shortened_gradient_moves_the_state_less() {
     let (network, _) = network();
     let moved = |max_norm| {
         let ascent = Ascent::Momentum { rate: 1e-2, momentum: 0.0 };
-        let options =
-            ErrorRegressionOptions { window: 10, iterations: 1, ascent, max_norm, ..ErrorRegressionOptions::new(2) };
+        let options = ErrorRegressionOptions::with(2, |it| {
+            it.window = 10;
+            it.iterations = 1;
+            it.ascent = ascent;
+            it.max_norm = max_norm;
+        });
         let mut regression =
             ErrorRegression::new(&network, &[0.1; UNITS], options, &Engine::new(1, InstructionSet::Portable).unwrap())
                 .unwrap();

@@ -32,7 +32,10 @@ impl Training {
     /// A new network on `data`, with Adam on a schedule so long that its rate stays near 0: all epochs cost the same.
     pub fn new(topology: &Topology, data: &Dataset, threads: usize, set: InstructionSet) -> Self {
         let (network, states) = initialize(topology, data.sequences().len(), 1);
-        let plan = Plan { epochs: 1 << 50, optimiser: Optimiser::Adam(Adam::default()), ..Plan::default() };
+        let plan = Plan::with(|it| {
+            it.epochs = 1 << 50;
+            it.optimiser = Optimiser::Adam(Adam::default());
+        });
         let engine = Engine::new(threads, set).expect("an instruction set that this processor has");
         let learner = Learner::new(network, states, data, plan, &engine).expect("data made for the network");
         Self { learner }

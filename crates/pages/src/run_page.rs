@@ -32,12 +32,11 @@ pub fn page(trained: &Trained, data: &Dataset, rows: &[Row], seed: u64, engine: 
     let initial_states = &checkpoint.initial_states;
     let states: Vec<&[f64]> = (0..initial_states.sequences()).map(|s| initial_states.sequence(s)).collect();
     let open = assessment::open_loop(&network, &states, &scaled, engine)?;
-    let options = GenerationOptions {
-        steps: assessment::longest(&scaled, delay),
-        feedback: Feedback::closed(n, network.topology().has_variance()),
-        seed,
-        contexts: false,
-    };
+    let options = GenerationOptions::new(
+        assessment::longest(&scaled, delay),
+        Feedback::closed(n, network.topology().has_variance()),
+    )
+    .seed(seed);
     let closed = assessment::run(&network, &states, &scaled, &options, engine)?;
 
     let mut assessment = Assessment::new(&scaled, &Predictions::of(&open, &scaled, delay), None, delay);

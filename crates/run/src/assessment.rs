@@ -74,7 +74,7 @@ pub fn longest(data: &Dataset, delay: usize) -> usize {
 pub fn open_loop(network: &Network, states: &[&[f64]], data: &Dataset, engine: &Engine) -> Result<Vec<Generated>> {
     let steps = longest(data, network.topology().delay());
     let feedback = Feedback::open(data.channels().len());
-    run(network, states, data, &GenerationOptions { steps, feedback, seed: 1, contexts: false }, engine)
+    run(network, states, data, &GenerationOptions::new(steps, feedback), engine)
 }
 
 impl Predictions {
@@ -145,7 +145,12 @@ mod tests {
     #[test]
     fn the_nll_is_that_of_a_gaussian_and_its_floor_the_entropy() {
         let data = Dataset::new(vec!["y".into()], vec![Sequence::new("", 1, vec![9.0, 1.0, -1.0]).unwrap()]).unwrap();
-        let generated = Generated { mean: vec![0.0; 4], variance: vec![1.0; 4], ..Generated::default() };
+        let generated = {
+            let mut it = Generated::default();
+            it.mean = vec![0.0; 4];
+            it.variance = vec![1.0; 4];
+            it
+        };
         let predictions = Predictions::of(&[generated], &data, 1);
         assert_eq!(predictions.errors, [1.0, -1.0]);
         assert!((predictions.nll().unwrap() - gaussian_entropy(1.0)).abs() < 1e-15);

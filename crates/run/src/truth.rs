@@ -57,7 +57,7 @@ pub fn compare(
         .map(|(s, sequence)| Start { initial_state: initial_states.sequence(s), sensed: sequence.values() })
         .collect();
     let run = |feedback| {
-        let options = GenerationOptions { steps, feedback, seed: SEED, contexts: false };
+        let options = GenerationOptions::new(steps, feedback).seed(SEED);
         generate(network, &starts, &options, engine)
     };
     let (open, closed) = (run(Feedback::open(n))?, run(Feedback::closed(n, true))?);

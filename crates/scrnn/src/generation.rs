@@ -67,6 +67,7 @@ pub struct Start<'a> {
 
 /// How to generate.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct GenerationOptions {
     /// Steps to predict.
     pub steps: usize,
@@ -78,8 +79,31 @@ pub struct GenerationOptions {
     pub contexts: bool,
 }
 
+impl GenerationOptions {
+    /// So many steps with these inputs; the noise has seed 1, and contexts are not recorded.
+    #[must_use]
+    pub fn new(steps: usize, feedback: Feedback) -> Self {
+        Self { steps, feedback, seed: 1, contexts: false }
+    }
+
+    /// The same with another seed of the noise.
+    #[must_use]
+    pub fn seed(mut self, seed: u64) -> Self {
+        self.seed = seed;
+        self
+    }
+
+    /// The same with the contexts recorded, or not.
+    #[must_use]
+    pub fn contexts(mut self, contexts: bool) -> Self {
+        self.contexts = contexts;
+        self
+    }
+}
+
 /// One generated sequence, in the network's units; row k is the prediction of sample k + xi.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
 pub struct Generated {
     /// y, `[steps, N_O]`.
     pub mean: Vec<f64>,

@@ -25,16 +25,12 @@
 //! # Quick start
 //!
 //! ```
-//! use scrnn::dataset::{Dataset, Sequence};
-//! use scrnn::engine::Engine;
-//! use scrnn::generation::{Feedback, GenerationOptions, Start, generate};
-//! use scrnn::initialization::initialize;
 //! use std::ops::ControlFlow;
-//! use scrnn::learning::{Adam, EpochReport, Learner, Optimiser, Outcome, Plan};
-//! use scrnn::recognition::{RecognitionOptions, recognize};
-//! use scrnn::topology::Topology;
 //!
-//! # fn main() -> scrnn::error::Result<()> {
+//! use scrnn::learning::EpochReport;
+//! use scrnn::*;
+//!
+//! # fn main() -> Result<()> {
 //! // Two waves on one channel, within reach of the mean units, which is -1 to 1.
 //! let wave = |name: &str, period: f64| {
 //!     let sample = |t: i32| 0.7 * (6.2832 * f64::from(t) / period).sin() + 0.04 * f64::from(t * t).sin();
@@ -45,12 +41,11 @@
 //! // An S-CTRNN: 12 context units with a time constant of 2 steps.
 //! let topology = Topology::s_ctrnn(1, 12, 2.0)?;
 //! let (network, initial_states) = initialize(&topology, 2, 1);
-//! let plan = Plan {
-//!     epochs: 800,
-//!     initial_state_variance: 10.0,
-//!     optimiser: Optimiser::Adam(Adam { rate: 0.02, ..Adam::default() }),
-//!     ..Plan::default()
-//! };
+//! let plan = Plan::with(|plan| {
+//!     plan.epochs = 800;
+//!     plan.initial_state_variance = 10.0;
+//!     plan.optimiser = Optimiser::Adam(Adam::with(|adam| adam.rate = 0.02));
+//! });
 //! let engine = Engine::serial();
 //! let mut learner = Learner::new(network, initial_states, &data, plan, &engine)?;
 //! let mut nll = Vec::new();
@@ -64,14 +59,17 @@
 //! // Closed loop: from the initial state of "fast" and its first sample, fed with its own noisy predictions.
 //! let (network, learned) = (learner.network(), learner.initial_states());
 //! let start = Start { initial_state: learned.sequence(1), sensed: data.sequences()[1].sample(0) };
-//! let options = GenerationOptions { steps: 50, feedback: Feedback::closed(1, true), seed: 1, contexts: false };
+//! let options = GenerationOptions::new(50, Feedback::closed(1, true));
 //! let generated = generate(network, &[start], &options, &engine)?;
 //! assert_eq!(generated[0].sample.len(), 50);
 //! assert!(generated[0].variance.iter().all(|v| *v > 0.0));
 //!
 //! // Recognition: which initial state explains a sequence, and which learned sequence is it like?
 //! let unknown = Dataset::new(vec!["y".into()], vec![data.sequences()[1].truncated(40)])?;
-//! let options = RecognitionOptions { starts: 4, epochs: 20, ..RecognitionOptions::default() };
+//! let options = RecognitionOptions::with(|options| {
+//!     options.starts = 4;
+//!     options.epochs = 20;
+//! });
 //! let recognised = recognize(network, learned, &unknown, &options, &engine)?;
 //! assert_eq!(recognised[0].ranking[0].sequence, 1);
 //! # Ok(())
@@ -96,6 +94,16 @@
 //! | [`evaluation`], [`analysis`] | errors and bounds; components, clusters, calibration, simple models | 3.2.4-3.2.6 |
 //! | [`checkpoint`] | a trained network as bytes | |
 //! | [`error`] | what can be wrong with a request | |
+//!
+//! # Features
+//!
+//! | feature | what it adds | default |
+//! |---|---|---|
+//! | `rayon` | threads; without it everything runs on the thread that calls | yes |
+//! | `checkpoint` | trained networks as safetensors bytes | yes |
+//! | `analysis` | components, clusters, calibration, simple models, t-tests | yes |
+//! | `serde` | options to and from other formats | |
+//! | `schemars` | JSON schemas of the options | |
 //!
 //! # What holds everywhere
 //!

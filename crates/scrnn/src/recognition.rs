@@ -28,6 +28,7 @@ pub use polish::Polish;
 
 /// A kind of starting point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum WarmStart {
     /// All zeros.
     Zero,
@@ -42,6 +43,7 @@ pub enum WarmStart {
 
 /// How to recognise.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct RecognitionOptions {
     /// Starts for each sequence.
     pub starts: usize,
@@ -91,6 +93,7 @@ impl Default for RecognitionOptions {
 
 /// Where a trial began.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum TrialStart {
     /// All zeros.
     Zero,
@@ -115,6 +118,7 @@ impl fmt::Display for TrialStart {
 
 /// What one start ended in.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Trial {
     /// Where it began.
     pub start: TrialStart,
@@ -128,6 +132,16 @@ pub struct Trial {
     pub error: f64,
 }
 
+impl RecognitionOptions {
+    /// The defaults with some of them changed.
+    #[must_use]
+    pub fn with(change: impl FnOnce(&mut Self)) -> Self {
+        let mut options = Self::default();
+        change(&mut options);
+        options
+    }
+}
+
 impl Trial {
     /// ln L_all = ln L_out + ln L_init in nats (2.15): what the ascent climbs, and what trials are ordered by.
     #[must_use]
@@ -138,6 +152,7 @@ impl Trial {
 
 /// How well a learned initial state explains a sequence.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Ranked {
     /// The learned sequence, from 0.
     pub sequence: usize,
@@ -149,6 +164,7 @@ pub struct Ranked {
 
 /// The result for one sequence.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Recognition {
     /// All starts, that of the highest ln L_all first; it is the one that was polished.
     pub trials: Vec<Trial>,

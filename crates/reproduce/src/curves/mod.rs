@@ -176,7 +176,7 @@ impl Study for Curves {
 
         let closed_loop = |network: &Learned, noise: bool, contexts: bool| {
             let feedback = Feedback::closed(n, noise);
-            let options = GenerationOptions { steps: STEPS, feedback, seed: seed + CLOSED_LOOP, contexts };
+            let options = GenerationOptions::new(STEPS, feedback).seed(seed + CLOSED_LOOP).contexts(contexts);
             assessment::run(&network.network, &network.states(), data, &options, engine)
         };
         let closed = closed_loop(learned, true, count <= 12)?;

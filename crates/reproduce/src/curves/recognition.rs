@@ -33,18 +33,17 @@ pub fn recognition<'a>(
 ) -> Result<Vec<(usize, usize)>> {
     desk.say("recognition, which takes a while");
     let engine = desk.engine();
-    let options = RecognitionOptions {
-        seed,
-        initial_state_variance: learned.experiment.network.initial_state_variance,
-        warm_starts: vec![WarmStart::Random],
-        random_spread: SPREAD,
-        rate: RATE,
-        beta2: BETA_2,
-        observed: Some(OBSERVED),
+    let options = RecognitionOptions::with(|it| {
+        it.seed = seed;
+        it.initial_state_variance = learned.experiment.network.initial_state_variance;
+        it.warm_starts = vec![WarmStart::Random];
+        it.random_spread = SPREAD;
+        it.rate = RATE;
+        it.beta2 = BETA_2;
+        it.observed = Some(OBSERVED);
         // A training that was cut short for a trial does not deserve more.
-        epochs: RecognitionOptions::default().epochs.min(learned.experiment.training.epochs),
-        ..RecognitionOptions::default()
-    };
+        it.epochs = RecognitionOptions::default().epochs.min(learned.experiment.training.epochs);
+    });
     let (n, delay) = (new.channels().len(), learned.network.topology().delay());
     let found = recognize(&learned.network, &learned.initial_states, new, &options, engine)?;
     desk.at(|| "recognition: running from what was found".to_owned())?;
@@ -57,7 +56,7 @@ pub fn recognition<'a>(
         .collect();
     let (steps, per) = (STEPS - delay, options.starts);
     let within = |feedback| -> Result<Vec<bool>> {
-        let options = GenerationOptions { steps, feedback, seed: seed + CLOSED_LOOP, contexts: false };
+        let options = GenerationOptions::new(steps, feedback).seed(seed + CLOSED_LOOP);
         let generated = generate(&learned.network, &starts, &options, engine)?;
         let judged = generated.iter().enumerate().map(|(k, one)| {
             let s = k / per;

@@ -35,7 +35,11 @@ mod tests {
                 [0.1 * angle.cos(), 0.9 * angle.sin(), 0.8 * angle.sin(), 0.5 * angle.cos()]
             })
             .collect();
-        let generated = Generated { contexts, ..Generated::default() };
+        let generated = {
+            let mut it = Generated::default();
+            it.contexts = contexts;
+            it
+        };
         assert_eq!(two_units(&[generated], 4), Some((1, 3)));
         assert_eq!(two_units(&[Generated::default()], 4), None);
     }

@@ -48,7 +48,11 @@ impl Material {
         let closed = subject.on_its_own(|s| s, subject.seed, true)?.swap_remove(shown);
         let state = subject.states.sequence(subject.other());
         let options = ErrorRegressionOptions::new(subject.data.channels().len());
-        let quiet = ErrorRegressionOptions { iterations: 0, ..options.clone() };
+        let quiet = {
+            let mut it = options.clone();
+            it.iterations = 0;
+            it
+        };
         let topology = &subject.network.topology();
         let learned: Vec<bool> = topology.per_unit(|group| group.learns_initial_state).collect();
         let places = |slow: bool| (0..learned.len()).filter(|&i| learned[i] == slow).collect::<Vec<_>>();

@@ -47,7 +47,11 @@ impl Findings {
     pub fn of(setting: &Setting, subject: &Subject<'_>, study: &Interact) -> Result<Self> {
         let state = subject.states.sequence(subject.other());
         let default = ErrorRegressionOptions::new(subject.data.channels().len());
-        let quiet = ErrorRegressionOptions { iterations: 0, ..default.clone() };
+        let quiet = {
+            let mut it = default.clone();
+            it.iterations = 0;
+            it
+        };
         let desk = subject.desk;
         Ok(Self {
             closed_loop: desk.part("the network on its own", || subject.closed_loop())?,
@@ -85,5 +89,8 @@ impl Regression {
 /// The thesis' ascent: momentum at alpha_init of the training (5.3.4).
 pub fn thesis(channels: usize) -> ErrorRegressionOptions {
     let ascent = Ascent::Momentum { rate: 1e-4 / channels as f64, momentum: 0.9 };
-    ErrorRegressionOptions { ascent, max_norm: None, ..ErrorRegressionOptions::new(channels) }
+    ErrorRegressionOptions::with(channels, |it| {
+        it.ascent = ascent;
+        it.max_norm = None;
+    })
 }

@@ -120,7 +120,7 @@ impl Subject<'_> {
             .collect();
         let longest = self.data.sequences().iter().map(|sequence| sequence.len()).max().unwrap_or(0);
         let steps = (PATIENCE * longest as f64) as usize;
-        let options = GenerationOptions { steps, feedback: Feedback::closed(n, true), seed, contexts };
+        let options = GenerationOptions::new(steps, Feedback::closed(n, true)).seed(seed).contexts(contexts);
         Ok(generate(self.network, &starts, &options, self.desk.engine())?)
     }
 
@@ -201,7 +201,7 @@ impl Subject<'_> {
             .collect();
         let longest = self.data.sequences().iter().map(|sequence| sequence.len()).max().unwrap_or(0);
         let steps = longest - self.network.topology().delay();
-        let options = GenerationOptions { steps, feedback, seed: self.seed, contexts: false };
+        let options = GenerationOptions::new(steps, feedback).seed(self.seed);
         Ok(generate(self.network, &starts, &options, self.desk.engine())?)
     }
 

@@ -88,13 +88,12 @@ impl Study for LimitCycle {
         let (own, new) = (make(steps, seed)?, make(STEPS, seed + HELD_OUT)?);
 
         // New sequences have other phases: the network first listens to find where each of them starts.
-        let options = RecognitionOptions {
-            starts: 6,
-            epochs: 100,
-            seed,
-            initial_state_variance: learned.experiment.network.initial_state_variance,
-            ..RecognitionOptions::default()
-        };
+        let options = RecognitionOptions::with(|it| {
+            it.starts = 6;
+            it.epochs = 100;
+            it.seed = seed;
+            it.initial_state_variance = learned.experiment.network.initial_state_variance;
+        });
         let found: Vec<Vec<f64>> = desk.part("recognition", || {
             desk.say("recognition of new sequences");
             let found = recognize(network, &learned.initial_states, &new.task.data, &options, engine)?;
@@ -105,7 +104,7 @@ impl Study for LimitCycle {
         let on_new = assessment::open_loop(network, &found, &new.task.data, engine)?;
         let run = |steps, contexts| {
             let options =
-                GenerationOptions { steps, feedback: Feedback::closed(1, true), seed: seed + CLOSED_LOOP, contexts };
+                GenerationOptions::new(steps, Feedback::closed(1, true)).seed(seed + CLOSED_LOOP).contexts(contexts);
             assessment::run(network, &learned.states(), data, &options, engine)
         };
         let closed = run(STEPS, true)?;

@@ -71,12 +71,7 @@ impl Study for Sinusoid {
         let delay = network.topology().delay();
         let ideal = make(TaskName::Sinusoid, (1, STEPS + delay), seed, 1)?;
         let new = make(TaskName::Sinusoid, (1, STEPS), seed + HELD_OUT, 1)?;
-        let options = GenerationOptions {
-            steps: STEPS,
-            feedback: Feedback::closed(1, true),
-            seed: seed + CLOSED_LOOP,
-            contexts: false,
-        };
+        let options = GenerationOptions::new(STEPS, Feedback::closed(1, true)).seed(seed + CLOSED_LOOP);
         let closed = assessment::run(network, &learned.states(), data, &options, engine)?.remove(0);
         let open = |data: &Dataset| assessment::open_loop(network, &learned.states(), data, engine);
         let (on_learned, on_new) = (open(data)?, open(&new.data)?);

@@ -41,14 +41,14 @@ impl Experiment {
             OptimiserName::Momentum => Optimiser::Momentum(training.momentum.clone().unwrap_or_default()),
             OptimiserName::Adam => Optimiser::Adam(training.adam.clone().unwrap_or_default()),
         };
-        Plan {
-            epochs: training.epochs,
-            initial_state_variance: self.network.initial_state_variance,
-            optimiser,
-            lbfgs: training.lbfgs.clone(),
-            recompute: training.recompute,
-            on_divergence: training.on_divergence,
-        }
+        Plan::with(|it| {
+            it.epochs = training.epochs;
+            it.initial_state_variance = self.network.initial_state_variance;
+            it.optimiser = optimiser;
+            it.lbfgs = training.lbfgs.clone();
+            it.recompute = training.recompute;
+            it.on_divergence = training.on_divergence;
+        })
     }
 }
 

@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 
 /// How the internal state is moved; every sample starts from rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Ascent {
     /// Gradient ascent with momentum, as in the thesis.
     Momentum {
@@ -21,6 +22,7 @@ pub enum Ascent {
 
 /// How to regress.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct ErrorRegressionOptions {
     /// W, in steps.
     pub window: usize,
@@ -42,6 +44,14 @@ pub struct ErrorRegressionOptions {
 }
 
 impl ErrorRegressionOptions {
+    /// The defaults on so many channels with some of them changed.
+    #[must_use]
+    pub fn with(channels: usize, change: impl FnOnce(&mut Self)) -> Self {
+        let mut options = Self::new(channels);
+        change(&mut options);
+        options
+    }
+
     /// A window of 50 steps and 10 iterations of Adam, which suits most networks; every channel senses, and the window
     /// runs in the closed loop.
     #[must_use]

@@ -18,6 +18,7 @@ use std::ops::ControlFlow;
 
 /// What the evaluation of an epoch found.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct EpochReport {
     /// Epochs done so far; 0 is the initial network.
     pub epoch: u64,

@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 
 /// A training.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Plan {
     /// Passes through the data; each is one update, but for Adam in batches. An epoch of L-BFGS is an update, and now and then more
     /// than one pass.
@@ -48,6 +49,7 @@ impl Default for Plan {
 
 /// How to ascend.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Optimiser {
     /// Gradient ascent with momentum, the thesis' rule (2.17)-(2.19).
     Momentum(Momentum),
@@ -61,6 +63,7 @@ pub enum Optimiser {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
+#[non_exhaustive]
 pub struct Momentum {
     /// alpha-tilde.
     pub rate: f64,
@@ -99,6 +102,7 @@ pub enum PriorStep {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
+#[non_exhaustive]
 pub struct AdaptiveRate {
     /// r_th.
     pub max_error_ratio: f64,
@@ -122,6 +126,7 @@ impl Default for AdaptiveRate {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
+#[non_exhaustive]
 pub struct Adam {
     /// The largest rate.
     pub rate: f64,
@@ -177,6 +182,7 @@ impl Default for Adam {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
+#[non_exhaustive]
 pub struct Lbfgs {
     /// Share of the epochs, the last ones; 1 leaves none to the optimiser.
     pub share: f64,
@@ -265,6 +271,23 @@ impl Lbfgs {
         require("lbfgs.memory", self.memory as f64, sound, "a number from 1 to 1000")
     }
 }
+
+/// `with` for options: the defaults with some of them changed.
+macro_rules! with {
+    ($($options:ident),*) => {$(
+        impl $options {
+            /// The defaults with some of them changed.
+            #[must_use]
+            pub fn with(change: impl FnOnce(&mut Self)) -> Self {
+                let mut options = Self::default();
+                change(&mut options);
+                options
+            }
+        }
+    )*};
+}
+
+with!(Plan, Momentum, AdaptiveRate, Adam, Lbfgs);
 
 fn positive(what: &'static str, value: f64) -> Result<()> {
     require(what, value, value > 0.0, "a number above 0")

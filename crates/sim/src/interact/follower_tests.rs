@@ -63,7 +63,9 @@ fn an_object_out_of_view_stays_where_it_was_seen_last_and_the_interaction_goes_o
     let (network, initial_state, scaling) = untrained();
     let engine = &Engine::serial();
     let controller = Controller { network: &network, scaling: &scaling, initial_state: &initial_state, engine };
-    let options = with_own_arm(ErrorRegressionOptions { iterations: 1, ..ErrorRegressionOptions::new(8) });
+    let options = with_own_arm(ErrorRegressionOptions::with(8, |it| {
+        it.iterations = 1;
+    }));
     let mut interaction = Interaction::new(&parse_order("R").unwrap(), &InteractionOptions::default(), 5).unwrap();
     interaction.turn_away();
     let observe = |regression: &mut ErrorRegression, sample: &[f64]| regression.observe(sample, &mut || true);
@@ -93,7 +95,9 @@ fn whoever_watches_can_end_an_interaction() {
     let (network, initial_state, scaling) = untrained();
     let engine = &Engine::serial();
     let controller = Controller { network: &network, scaling: &scaling, initial_state: &initial_state, engine };
-    let options = with_own_arm(ErrorRegressionOptions { iterations: 0, ..ErrorRegressionOptions::new(8) });
+    let options = with_own_arm(ErrorRegressionOptions::with(8, |it| {
+        it.iterations = 0;
+    }));
     let mut interaction = Interaction::new(&parse_order("R").unwrap(), &InteractionOptions::default(), 5).unwrap();
     let observe = |regression: &mut ErrorRegression, sample: &[f64]| regression.observe(sample, &mut || true);
     let mut seen = 0;
@@ -110,7 +114,9 @@ fn the_loop_runs_from_sensors_to_arm_and_the_same_seed_gives_the_same_bits() {
     let [centre, ..] = arm_postures();
     let engine = &Engine::serial();
     let controller = Controller { network: &network, scaling: &scaling, initial_state: &initial_state, engine };
-    let options = with_own_arm(ErrorRegressionOptions { iterations: 2, ..ErrorRegressionOptions::new(8) });
+    let options = with_own_arm(ErrorRegressionOptions::with(8, |it| {
+        it.iterations = 2;
+    }));
     let observe = |regression: &mut ErrorRegression, sample: &[f64]| regression.observe(sample, &mut || true);
     let run = || {
         let mut interaction = Interaction::new(&parse_order("R").unwrap(), &InteractionOptions::default(), 5).unwrap();

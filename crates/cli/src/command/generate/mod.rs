@@ -109,12 +109,9 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     )?;
     let starts: Vec<Start<'_>> =
         rows.iter().map(|row| Start { initial_state: &row.state, sensed: &row.sensed }).collect();
-    let options = GenerationOptions {
-        steps: rows.iter().map(|row| row.steps).max().unwrap_or(0),
-        feedback,
-        seed: arguments.seed,
-        contexts: arguments.contexts,
-    };
+    let options = GenerationOptions::new(rows.iter().map(|row| row.steps).max().unwrap_or(0), feedback)
+        .seed(arguments.seed)
+        .contexts(arguments.contexts);
     let generated = generate(&trained.network(), &starts, &options, &shared.engine()?)?;
     let fields = fields(&trained.checkpoint, &rows, &generated)?;
     if arguments.json {

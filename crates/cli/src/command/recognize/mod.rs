@@ -175,13 +175,12 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
 }
 
 fn options(arguments: &Arguments, trained: &Trained) -> RecognitionOptions {
-    let mut options = RecognitionOptions {
-        starts: arguments.starts as usize,
-        epochs: arguments.epochs,
-        seed: arguments.seed,
-        observed: arguments.observed,
-        ..RecognitionOptions::default()
-    };
+    let mut options = RecognitionOptions::with(|it| {
+        it.starts = arguments.starts as usize;
+        it.epochs = arguments.epochs;
+        it.seed = arguments.seed;
+        it.observed = arguments.observed;
+    });
     if let Some(rate) = arguments.rate {
         options.rate = rate;
     }
@@ -211,7 +210,7 @@ fn replay(
         .collect();
     let longest = scaled.sequences().iter().map(Sequence::len).max().unwrap_or(0);
     let steps = longest - trained.checkpoint.topology.delay();
-    let options = GenerationOptions { steps, feedback: Feedback::mixed(n, 1.0, false), seed: 0, contexts: false };
+    let options = GenerationOptions::new(steps, Feedback::mixed(n, 1.0, false)).seed(0);
     Ok(generate(&trained.network(), &starts, &options, engine)?)
 }
 
