@@ -174,7 +174,7 @@ fn measure(shape: Shape, data: &Dataset, rounds: usize, set: InstructionSet) -> 
 /// Both paths must compute the same thing.
 fn agree(learner: &mut Learner, plain: &plain_nalgebra::Gradient) {
     let close = |a: f64, b: f64| (a - b).abs() <= 1e-9 * b.abs();
-    learner.run(&mut |report: &EpochReport, _: &Learner| {
+    let _ = learner.run(&mut |report: &EpochReport, _: &Learner| {
         let (ours, theirs) = (report.ln_likelihood, plain.ln_likelihood);
         assert!(close(ours, theirs), "ln L is {ours}, by nalgebra {theirs}");
         // The report's length is for one step and channel.

@@ -20,6 +20,17 @@ pub enum Ascent {
     },
 }
 
+impl Ascent {
+    /// The same rule at another rate.
+    #[must_use]
+    pub fn with_rate(self, rate: f64) -> Self {
+        match self {
+            Self::Momentum { momentum, .. } => Self::Momentum { rate, momentum },
+            Self::Adam { .. } => Self::Adam { rate },
+        }
+    }
+}
+
 /// How to regress.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]

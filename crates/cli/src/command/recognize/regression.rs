@@ -69,8 +69,7 @@ impl RegressionArguments {
             (None, None) => {}
         }
         if let Some(given) = rate {
-            let (Ascent::Momentum { rate, .. } | Ascent::Adam { rate }) = &mut options.ascent;
-            *rate = given;
+            options.ascent = options.ascent.with_rate(given);
         }
         if let Some(norm) = self.max_norm {
             options.max_norm = Some(norm).filter(|&norm| norm != 0.0);
