@@ -41,7 +41,7 @@ fn learner(plan: Plan) -> Learner {
 /// Learns to the end; all reports.
 fn run(learner: &mut Learner) -> Vec<EpochReport> {
     let mut reports = Vec::new();
-    learner.run(&mut |report: &EpochReport, _: &Learner| {
+    let _ = learner.run(&mut |report: &EpochReport, _: &Learner| {
         reports.push(report.clone());
         ControlFlow::Continue(())
     });

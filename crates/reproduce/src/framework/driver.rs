@@ -6,7 +6,6 @@ use std::time::Instant;
 use scrnn::engine::Engine;
 use scrnn::jobs::side_by_side;
 use scrnn::learning::Outcome;
-use scrnn::network::Network;
 use scrnn_report::PAGE;
 use scrnn_run::experiment::Experiment;
 use scrnn_run::failure::{Ending, Failure};
