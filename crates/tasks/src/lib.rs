@@ -145,7 +145,7 @@ mod tests {
         for seed in 0..200 {
             // The first numbers that are drawn, before a draw that takes two of them sets the two apart.
             let (network, _) = initialize(&topology, 1, seed);
-            weights.extend_from_slice(&network.parameters.as_slice()[..16]);
+            weights.extend_from_slice(&network.parameters().as_slice()[..16]);
             let task = lissajous::generate(&lissajous::Options { sequences: 1, steps: 8 }, seed).unwrap();
             let [data, means] = [&task.data, &task.means].map(|set| set.sequences()[0].values());
             noise.extend(data.iter().zip(means).map(|(sample, mean)| sample - mean));
