@@ -20,26 +20,18 @@ def covered(sample, mean, variance, deviations):
 
 
 def dtw(a, b):
-    """Mean Euclidean distance along the cheapest warping path (steps 1,0 / 0,1 / 1,1), one antidiagonal at a time."""
+    """Euclidean distance along the cheapest warping path (steps 1,0 / 0,1 / 1,1), over the number of steps of `a`."""
     distance = np.sqrt(np.maximum((a**2).sum(1)[:, None] + (b**2).sum(1)[None] - 2 * a @ b.T, 0.0))
     n, m = distance.shape
-    # Cell i of the diagonal d is row i, column d - i; cost and path length of the two diagonals before.
-    before, last = (np.full(n + 1, np.inf), np.zeros(n + 1)), (np.full(n + 1, np.inf), np.zeros(n + 1))
+    # One antidiagonal at a time. Cell (i, d - i) of diagonal d stands at i + 1, so that index 0 lies outside.
+    before, last = np.full(n + 1, np.inf), np.full(n + 1, np.inf)
+    before[0] = 0.0
     for d in range(n + m - 1):
-        low, high = max(0, d - m + 1), min(n - 1, d)
-        rows = np.arange(low, high + 1)
-        # Index i + 1 holds row i, index 0 lies outside.
-        ways = np.stack([before[0][rows], last[0][rows], last[0][rows + 1]])
-        if d == 0:
-            ways[0] = 0.0
-        best = np.argmin(ways, axis=0)
-        lengths = np.stack([before[1][rows], last[1][rows], last[1][rows + 1]])
-        cost, length = np.full(n + 1, np.inf), np.zeros(n + 1)
-        pick = np.arange(len(rows))
-        cost[rows + 1] = distance[rows, d - rows] + ways[best, pick]
-        length[rows + 1] = 1 + (0 if d == 0 else lengths[best, pick])
-        before, last = last, (cost, length)
-    return float(last[0][n] / last[1][n])
+        rows = np.arange(max(0, d - m + 1), min(n - 1, d) + 1)
+        cost = np.full(n + 1, np.inf)
+        cost[rows + 1] = distance[rows, d - rows] + np.minimum(np.minimum(before[rows], last[rows]), last[rows + 1])
+        before, last = last, cost
+    return float(last[n] / n)
 
 
 def jerk(path):
