@@ -63,7 +63,8 @@ def write(path, sequences):
 
 def read(path, field):
     held = np.load(path)
-    return [held[name] for name in sorted(held.files) if name.startswith(f"{field}_")]
+    names = [name for name in held.files if name.startswith(f"{field}_")]
+    return [held[name] for name in sorted(names, key=lambda name: int(name.rsplit("_", 1)[1]))]
 
 
 class Scrnn(Method):
