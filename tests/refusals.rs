@@ -50,7 +50,7 @@ fn data_that_do_not_fit_together_are_refused() {
     assert!(!flat.is_empty() && Sequence::new("none", 1, vec![]).unwrap().is_empty());
     refused(Dataset::new(vec!["a".into(), "b".into()], vec![flat.clone()]), &["sequence 0", "1", "2"]);
     let narrow = Dataset::new(vec!["a".into()], vec![flat]).unwrap();
-    refused(narrow.check_for(&network().0.topology()), &["data set", "1", "2"]);
+    refused(narrow.check_for(network().0.topology()), &["data set", "1", "2"]);
 }
 
 #[test]
@@ -75,7 +75,7 @@ fn instructions_that_the_processor_does_not_have_are_refused_with_those_that_it_
 fn learning_and_recognising_ask_for_what_belongs_to_them() {
     let engine = Engine::new(1, InstructionSet::Portable).unwrap();
     let (network, states) = network();
-    let one = InitialStates::zeros(&network.topology(), 1);
+    let one = InitialStates::zeros(network.topology(), 1);
     let plan = Plan::with(|it| {
         it.epochs = 10;
     });
