@@ -5,6 +5,8 @@ use std::path::Path;
 
 use miette::{Diagnostic, NamedSource, SourceSpan};
 
+use crate::budget::OverBudget;
+
 /// A data file that cannot be read or written.
 #[derive(Debug, thiserror::Error, Diagnostic)]
 pub enum FileError {
@@ -25,10 +27,22 @@ pub enum FileError {
 
     /// The extension does not tell a format.
     #[error("the name of {path} does not tell what the file holds")]
-    #[diagnostic(help("data files end in .csv, .txt, .dat, .tsv, .npy, .npz or .mcap"))]
+    #[diagnostic(help("data files end in {known}"))]
     Extension {
         /// The file.
         path: String,
+        /// The extensions that are known.
+        known: String,
+    },
+
+    /// A pattern or a folder without data files.
+    #[error("{what}: {pattern}")]
+    #[diagnostic(help("check the spelling; paths start from the folder of the experiment file, or the current one"))]
+    NoMatch {
+        /// The pattern.
+        pattern: String,
+        /// What is missing.
+        what: &'static str,
     },
 
     /// A file that was to hold text.
@@ -113,14 +127,66 @@ pub enum FileError {
         help: Option<String>,
     },
 
-    /// An option that makes sense for recordings only.
-    #[error("{path} is no recording; `{option}` goes with .mcap files only")]
+    /// An option that makes sense for other formats only.
+    #[error("{path} is read as {format}; `{option}` goes with {known} only")]
     #[diagnostic(help("leave it out"))]
-    NotARecording {
+    UnknownOption {
         /// The file.
         path: String,
+        /// What kind of file it is.
+        format: &'static str,
         /// The option.
         option: &'static str,
+        /// Extensions of the formats that know it.
+        known: String,
+    },
+
+    /// A file that would fill the memory.
+    #[error("{path}: {problem}")]
+    #[diagnostic(help("it may be damaged; if it is not, unpack it or cut it into several files"))]
+    OverBudget {
+        /// The file.
+        path: String,
+        /// How much it would take.
+        problem: OverBudget,
+    },
+
+    /// Times that are not even, or cannot be made so.
+    #[error("{path}, sequence {sequence}: {found}; steps are equally spaced")]
+    #[diagnostic(help("{help}"))]
+    Times {
+        /// The file.
+        path: String,
+        /// The sequence.
+        sequence: String,
+        /// What was found.
+        found: String,
+        /// What to do.
+        help: String,
+    },
+
+    /// A period for data of which nobody knows when they were taken.
+    #[error("{path} does not tell when its samples were taken, so they cannot be brought to a period")]
+    #[diagnostic(help("leave `period` out, or add a column `time` in seconds"))]
+    NoClock {
+        /// The file.
+        path: String,
+    },
+
+    /// Files whose channels do not go together.
+    #[error("the channels of {path} are {found}; those of {first} are {needed}")]
+    #[diagnostic(help("{help}"))]
+    ChannelsDiffer {
+        /// The file that differs.
+        path: String,
+        /// Its channels.
+        found: String,
+        /// The first file.
+        first: String,
+        /// The channels of that.
+        needed: String,
+        /// What to do.
+        help: String,
     },
 
     /// A channel that is asked for, but not there.

@@ -7,9 +7,11 @@
 //! An array of three axes is sequences x steps x channels, of two steps x channels, of one the steps of one channel.
 //! Nothing is allocated on the word of a header: its promise is compared with the bytes that are there.
 
-use scrnn::dataset::{Dataset, Sequence};
+use scrnn::dataset::Sequence;
 
-use super::{ArrayProblem, Field, FileError, numbered};
+use crate::format::Source;
+use crate::samples::Samples;
+use crate::{ArrayProblem, Field, FileError, Selection};
 
 const MAGIC: &[u8] = b"\x93NUMPY";
 /// numpy itself refuses to read a longer header.
@@ -27,11 +29,12 @@ pub struct Array {
 }
 
 /// Reads the file called `path`.
-pub fn read(path: &str, bytes: &[u8]) -> Result<Dataset, FileError> {
+pub fn read(source: &Source<'_>, _: &Selection) -> Result<Samples, FileError> {
     let Array { shape: [_, steps, channels], values, .. } =
-        parse(bytes).map_err(|problem| file_error(path, problem))?;
+        parse(&source.bytes()?).map_err(|problem| file_error(source.name(), problem))?;
     let sequences = values.chunks_exact(steps * channels).map(<[f64]>::to_vec);
-    numbered(path, channels, sequences.enumerate().map(|(s, values)| ((s + 1).to_string(), values)).collect())
+    let sequences = sequences.enumerate().map(|(s, values)| ((s + 1).to_string(), values));
+    Ok(Samples::numbered(channels, sequences.collect()))
 }
 
 /// The bytes of a file of the only field.

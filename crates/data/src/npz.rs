@@ -5,18 +5,20 @@
 
 use std::io::{Cursor, Read, Write};
 
-use scrnn::dataset::Dataset;
 use zip::result::ZipError;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
 use super::npy::{Array, array_bytes, file_error, parse};
-use super::{ArrayProblem, Field, FileError, numbered};
+use crate::format::Source;
+use crate::samples::Samples;
+use crate::{ArrayProblem, Field, FileError, Selection};
 
 /// Reads the file called `path`.
-pub fn read(path: &str, bytes: &[u8]) -> Result<Dataset, FileError> {
+pub fn read(source: &Source<'_>, _: &Selection) -> Result<Samples, FileError> {
+    let (path, bytes) = (source.name(), source.bytes()?);
     let broken = |source| FileError::Archive { path: path.to_owned(), source };
-    let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(broken)?;
+    let mut archive = ZipArchive::new(Cursor::new(&*bytes)).map_err(broken)?;
     let alone = archive.len() == 1;
     let mut channels = None;
     let mut sequences = Vec::new();
@@ -46,7 +48,7 @@ pub fn read(path: &str, bytes: &[u8]) -> Result<Dataset, FileError> {
         }
     }
     match channels {
-        Some(channels) => numbered(path, channels, sequences),
+        Some(channels) => Ok(Samples::numbered(channels, sequences)),
         None => Err(FileError::Empty { path: path.to_owned() }),
     }
 }

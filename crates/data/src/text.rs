@@ -17,10 +17,22 @@ use scrnn::dataset::Dataset;
 use super::excerpt::{excerpt, shortened};
 pub use super::fields::DetectionOrder;
 use super::fields::{Field, Separator, Value, split};
-use super::{FileError, LineError, LineProblem, collect};
+use crate::format::Source;
+use crate::samples::Samples;
+use crate::{FileError, LineError, LineProblem, Selection};
+
+/// Reads a table whose fields stand between commas, or whatever else is found.
+pub fn read_csv(source: &Source<'_>, selection: &Selection) -> Result<Samples, FileError> {
+    read(source.name(), &source.bytes()?, DetectionOrder::CommaFirst, selection)
+}
+
+/// Reads a table whose fields stand between tabs, or whatever else is found.
+pub fn read_tsv(source: &Source<'_>, selection: &Selection) -> Result<Samples, FileError> {
+    read(source.name(), &source.bytes()?, DetectionOrder::TabFirst, selection)
+}
 
 /// Reads the text file called `path`.
-pub fn read(path: &str, bytes: &[u8], order: DetectionOrder) -> Result<Dataset, FileError> {
+fn read(path: &str, bytes: &[u8], order: DetectionOrder, _: &Selection) -> Result<Samples, FileError> {
     let text = decode(path, bytes)?;
     let layout = Layout::find(path, &text, order)?;
     let mut rows = Rows { path, text: &text, layout: &layout, sequences: Vec::new(), by_label: HashMap::new() };
@@ -29,7 +41,10 @@ pub fn read(path: &str, bytes: &[u8], order: DetectionOrder) -> Result<Dataset, 
     if sequences.is_empty() {
         return Err(FileError::Empty { path: path.to_owned() });
     }
-    collect(path, layout.channels(), sequences)
+    let named = layout.header.is_some();
+    let mut samples = Samples::named(layout.channels(), sequences);
+    samples.facts.named = named;
+    Ok(samples)
 }
 
 /// UTF-8 without its mark, as far as it is; in line ends that [`str::lines`] knows.

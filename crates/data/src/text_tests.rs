@@ -7,7 +7,11 @@ use miette::{Diagnostic, SourceCode};
 type Contents = (Vec<String>, Vec<(String, Vec<f64>)>);
 
 fn read_text(text: &str) -> Result<Dataset, FileError> {
-    read("data.csv", text.as_bytes(), DetectionOrder::CommaFirst)
+    read_bytes("data.csv", text.as_bytes())
+}
+
+fn read_bytes(path: &str, bytes: &[u8]) -> Result<Dataset, FileError> {
+    crate::parse_as(std::path::Path::new(path), bytes, &Selection::default())
 }
 
 fn contents(text: &str) -> Contents {
@@ -78,7 +82,7 @@ fn windows_and_old_mac_files_read_alike() {
     let plain = expected(&["a", "b"], &[("1", &[1.0, 2.0]), ("2", &[3.0, 4.0])]);
     assert_eq!(contents("\u{feff}a,b\r\n1,2\r\n\r\n3,4\r\n"), plain);
     assert_eq!(contents("a,b\r1,2\r\r3,4\r"), plain);
-    let latin = read("x.txt", b"K\xf6rper\n1\n", DetectionOrder::CommaFirst).unwrap();
+    let latin = read_bytes("x.txt", b"K\xf6rper\n1\n").unwrap();
     assert_eq!(latin.channels(), ["K\u{fffd}rper"]);
 }
 
@@ -138,7 +142,7 @@ fn files_without_samples_say_so() {
 
 #[test]
 fn binary_files_are_told_from_text() {
-    let message = |bytes: &[u8]| read("x.csv", bytes, DetectionOrder::CommaFirst).unwrap_err().to_string();
+    let message = |bytes: &[u8]| read_bytes("x.csv", bytes).unwrap_err().to_string();
     assert_eq!(message(b"\xff\xfe1\0"), "x.csv is not plain text: it is encoded in UTF-16");
     assert_eq!(message(b"PK\x03\x04\0\0"), "x.csv is not plain text: it holds zero bytes");
 }

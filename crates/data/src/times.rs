@@ -1,0 +1,239 @@
+//! Times of samples: held to even steps, or brought to them.
+//!
+//! | intervals | what is done |
+//! |---|---|
+//! | all within a tenth of the middle one | taken as they are; the middle one is the period |
+//! | some further off, none by more than half | taken as they are, and said |
+//! | a gap, a time that falls, another rate | refused, with what would do; with a period resampled on straight lines |
+//!
+//! A gap of more than ten intervals is not bridged.
+
+use crate::reading::Gap;
+use crate::remark::Remark;
+use crate::samples::{Samples, Track};
+use crate::{FileError, Selection};
+
+/// Share of the middle interval by which intervals may differ and still count as even.
+const EVEN: f64 = 0.1;
+/// Share from which on a sample was lost: an interval nearer to two steps than to one.
+const LOST: f64 = 0.5;
+/// Middle intervals, or periods, that a straight line may bridge.
+const WIDEST_GAP: i128 = 10;
+/// Most samples that one sample may be turned into, on average.
+const MOST_PER_SAMPLE: i128 = 100;
+
+/// Brings all tracks to even steps and returns the period in seconds, where it is known.
+///
+/// # Errors
+/// [`FileError::Times`] with what was found.
+pub fn to_even_steps(path: &str, samples: &mut Samples, selection: &Selection) -> Result<Option<f64>, FileError> {
+    let refused = |sequence: &str, found: String, help: Option<String>| FileError::Times {
+        path: path.to_owned(),
+        sequence: sequence.to_owned(),
+        found,
+        help: help.unwrap_or_else(|| "choose another period, or cut the recording".to_owned()),
+    };
+    if samples.tracks.iter().all(|track| track.times.is_empty()) {
+        return match (selection.period_in_nanoseconds(), samples.period) {
+            (Some(wanted), Some(known)) if (wanted as f64 / 1e9 / known - 1.0).abs() > 1e-6 => {
+                // The samples are even, so their numbers tell the time.
+                let step = (known * 1e9).round().max(1.0) as i64;
+                for track in &mut samples.tracks {
+                    track.times = (0..track.values.len() / samples.channels.len().max(1))
+                        .map(|k| step.saturating_mul(k as i64))
+                        .collect();
+                }
+                to_even_steps(path, samples, selection)
+            }
+            (Some(_), None) => Err(FileError::NoClock { path: path.to_owned() }),
+            _ => Ok(samples.period),
+        };
+    }
+    let channels = samples.channels.len();
+    let wanted = selection.period_in_nanoseconds().and_then(|period| i64::try_from(period).ok());
+    let mut middles = Vec::new();
+    for track in &mut samples.tracks {
+        let Some(middle) = middle_interval(&track.times) else { continue };
+        let gaps = gaps(track, middle);
+        samples.facts.gaps.extend(gaps);
+        match (wanted, irregularity(track, middle)) {
+            (Some(period), _) if !selection.ignores_time() => {
+                track.values = resampled(track, channels, period).map_err(|found| refused(&track.name, found, None))?;
+                track.times = Vec::new();
+            }
+            (_, Some(Irregularity { found, .. })) if selection.ignores_time() => {
+                samples.remarks.push(Remark::Uneven { found: format!("sequence {}: {found}", track.name) });
+            }
+            (_, Some(Irregularity { found, wavers: true })) => {
+                samples.remarks.push(Remark::Uneven { found: format!("sequence {}: {found}", track.name) });
+            }
+            (_, Some(Irregularity { found, wavers: false })) => {
+                return Err(refused(&track.name, found, Some(help(middle))));
+            }
+            _ => {}
+        }
+        middles.push((track.name.clone(), middle));
+    }
+    if let Some(period) = wanted.filter(|_| !selection.ignores_time()) {
+        let found = match middles.first() {
+            Some((_, middle)) if *middle > 0 => format!("about {} s", seconds(*middle)),
+            _ => "single samples".to_owned(),
+        };
+        if middles.iter().any(|(_, middle)| off(*middle, period) > 1e-6) {
+            samples.remarks.push(Remark::Resampled { period: period as f64 / 1e9, found });
+        }
+        return Ok(Some(period as f64 / 1e9));
+    }
+    let Some((first, middle)) = middles.first().cloned() else { return Ok(samples.period) };
+    if let Some((other, differs)) = middles.iter().find(|(_, other)| off(*other, middle) > EVEN) {
+        let found =
+            format!("samples of {first} are {} s apart, those of {other} {} s", seconds(middle), seconds(*differs));
+        if !selection.ignores_time() {
+            return Err(refused(other, found, Some(help(middle.min(*differs)))));
+        }
+        samples.remarks.push(Remark::Uneven { found });
+    }
+    Ok((middle > 0).then(|| mean_interval(&samples.tracks).unwrap_or(middle as f64 / 1e9)))
+}
+
+fn help(middle: i64) -> String {
+    let period = seconds(middle.max(1));
+    format!("`period = {period}` brings them to even times; `time = \"rows\"` takes them as even steps all the same")
+}
+
+/// How far an interval is off, as a share of the middle one.
+fn off(interval: i64, middle: i64) -> f64 {
+    (interval as f64 - middle as f64).abs() / (middle as f64).abs().max(f64::MIN_POSITIVE)
+}
+
+/// What is uneven about times.
+struct Irregularity {
+    found: String,
+    /// Whether no sample seems to be lost.
+    wavers: bool,
+}
+
+fn irregularity(track: &Track, middle: i64) -> Option<Irregularity> {
+    let intervals = || track.times.windows(2).map(|pair| pair[1].saturating_sub(pair[0]));
+    if let Some(at) = intervals().position(|interval| interval < 0) {
+        let (before, after) = (since(track, at), since(track, at + 1));
+        let found = format!("the time falls from {before} s to {after} s after step {}", at + 1);
+        return Some(Irregularity { found, wavers: false });
+    }
+    if middle <= 0 {
+        return Some(Irregularity { found: "most samples have the time of the one before".to_owned(), wavers: false });
+    }
+    let count = intervals().filter(|&interval| off(interval, middle) > EVEN).count();
+    let (at, widest) = intervals().enumerate().max_by(|(_, a), (_, b)| off(*a, middle).total_cmp(&off(*b, middle)))?;
+    let wavers = off(widest, middle) <= LOST;
+    let found = format!(
+        "samples are {} s apart in the middle, but {} s after step {} (at {} s; {count} of {} intervals are off by over a tenth)",
+        seconds(middle),
+        seconds(widest),
+        at + 1,
+        since(track, at),
+        track.times.len() - 1,
+    );
+    (count > 0).then_some(Irregularity { found, wavers })
+}
+
+/// Seconds since the first sample.
+fn since(track: &Track, index: usize) -> String {
+    seconds(track.times[index].saturating_sub(track.times[0]))
+}
+
+/// Where time was lost.
+fn gaps(track: &Track, middle: i64) -> Vec<Gap> {
+    let pairs = track.times.windows(2).enumerate();
+    let lost = pairs.filter(|(_, pair)| {
+        let interval = pair[1].saturating_sub(pair[0]);
+        interval > middle && off(interval, middle) > LOST
+    });
+    // A thousand tell as much as a million.
+    lost.map(|(index, pair)| Gap {
+        sequence: track.name.clone(),
+        after: index + 1,
+        seconds: pair[1].saturating_sub(pair[0]) as f64 / 1e9,
+    })
+    .take(1000)
+    .collect()
+}
+
+/// The samples at every `period` nanoseconds from the first on: where a sample stands at that time its values, else on the
+/// straight line between its neighbours. What is missing on one side of a line is missing on it.
+///
+/// # Errors
+/// What stands against it, as a sentence.
+pub fn resampled(track: &Track, channels: usize, period: i64) -> Result<Vec<f64>, String> {
+    let times = &track.times;
+    let (Some(&first), Some(&last)) = (times.first(), times.last()) else { return Ok(Vec::new()) };
+    if let Some(at) = times.windows(2).position(|pair| pair[1] < pair[0]) {
+        return Err(format!(
+            "the time falls from {} s to {} s after step {}",
+            since(track, at),
+            since(track, at + 1),
+            at + 1
+        ));
+    }
+    let wide = |time: i64| i128::from(time);
+    let middle = middle_interval(times).unwrap_or(period);
+    let widest = WIDEST_GAP * wide(middle.max(period));
+    if let Some(at) = times.windows(2).position(|pair| wide(pair[1]) - wide(pair[0]) > widest) {
+        return Err(format!(
+            "no sample stands between {} s and {} s, which is too long to be bridged",
+            since(track, at),
+            since(track, at + 1)
+        ));
+    }
+    let samples = (wide(last) - wide(first)) / wide(period) + 1;
+    if samples > MOST_PER_SAMPLE * times.len() as i128 {
+        return Err(format!(
+            "{} samples would become {samples}; needed: at most {}",
+            times.len(),
+            MOST_PER_SAMPLE * times.len() as i128
+        ));
+    }
+    let mut at_even_times = Vec::with_capacity(usize::try_from(samples).unwrap_or(0).saturating_mul(channels));
+    let mut after = 0;
+    for k in 0..samples {
+        let time = wide(first) + k * wide(period);
+        while times.get(after + 1).is_some_and(|&next| wide(next) <= time) {
+            after += 1;
+        }
+        let row = |index: usize| &track.values[index * channels..(index + 1) * channels];
+        match times.get(after + 1) {
+            Some(&next) if time > wide(times[after]) => {
+                let share = (time - wide(times[after])) as f64 / (wide(next) - wide(times[after])) as f64;
+                at_even_times.extend(row(after).iter().zip(row(after + 1)).map(|(a, b)| a + share * (b - a)));
+            }
+            _ => at_even_times.extend(row(after)),
+        }
+    }
+    Ok(at_even_times)
+}
+
+/// The median of the intervals.
+fn middle_interval(times: &[i64]) -> Option<i64> {
+    let mut intervals: Vec<i64> = times.windows(2).map(|pair| pair[1].saturating_sub(pair[0])).collect();
+    let middle = intervals.len() / 2;
+    (!intervals.is_empty()).then(|| *intervals.select_nth_unstable(middle).1)
+}
+
+/// The mean interval over all tracks, in seconds, to nine digits: it is nearer to the true period than any single one,
+/// which is rounded.
+fn mean_interval(tracks: &[Track]) -> Option<f64> {
+    let spans = tracks.iter().filter_map(|track| Some((track.times.first()?, track.times.last()?, track.times.len())));
+    let (time, count) = spans.fold((0_i128, 0_i128), |(time, count), (first, last, samples)| {
+        (time + i128::from(*last) - i128::from(*first), count + samples as i128 - 1)
+    });
+    (count > 0 && time > 0).then(|| ((time as f64 / count as f64).round() / 1e9).max(1e-9))
+}
+
+/// Nanoseconds as seconds, without losing any.
+#[must_use]
+pub fn seconds(nanoseconds: i64) -> String {
+    let sign = if nanoseconds < 0 { "-" } else { "" };
+    let (whole, rest) = (nanoseconds.unsigned_abs() / 1_000_000_000, nanoseconds.unsigned_abs() % 1_000_000_000);
+    let text = format!("{sign}{whole}.{rest:09}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
