@@ -86,7 +86,7 @@ pub enum FileError {
         problem: ArrayProblem,
         /// What to do.
         #[help]
-        help: Option<&'static str>,
+        help: Option<String>,
     },
 
     /// An array with a value that is NaN or infinite.
@@ -113,6 +113,13 @@ pub enum FileError {
         /// What is wrong with it.
         #[source]
         source: zip::result::ZipError,
+    },
+
+    /// An archive whose members share bytes, so that it would unpack to far more than it has.
+    #[error("{path} is a damaged archive: its members overlap")]
+    Overlap {
+        /// The file.
+        path: String,
     },
 
     /// A recording that cannot be read.
@@ -310,6 +317,13 @@ pub enum LineProblem {
         first: usize,
     },
 
+    /// What could mean several things.
+    #[error("{what}")]
+    Ambiguous {
+        /// What it could be, and what to do.
+        what: &'static str,
+    },
+
     /// Something else than a number.
     #[error("`{found}` in column {column} is not a number")]
     NotANumber {
@@ -338,6 +352,7 @@ impl LineProblem {
     fn label(&self) -> String {
         match self {
             Self::FieldCount { found, needed, .. } => format!("{found} instead of {needed} fields"),
+            Self::Ambiguous { .. } => "this line".to_owned(),
             Self::NotANumber { .. } => "not a number".to_owned(),
             Self::NotFinite { .. } => "not a finite number".to_owned(),
         }
@@ -484,7 +499,7 @@ pub enum ArrayProblem {
     Header(&'static str),
 
     /// Elements that are not numbers.
-    #[error("an array of type `{found}`; needed: floats of 4 or 8 bytes, integers or booleans")]
+    #[error("an array of type `{}`; needed: floats, integers or booleans", super::excerpt::shortened(found))]
     Type {
         /// The type as numpy writes it.
         found: String,
@@ -499,6 +514,47 @@ pub enum ArrayProblem {
         needed: &'static str,
     },
 
+    /// More channels than steps: the axes may be another way round.
+    #[error("an array of shape {shape} would be {channels} channels of {steps} steps; it may be the other way round")]
+    MoreChannels {
+        /// The shape as numpy writes it.
+        shape: String,
+        /// Channels.
+        channels: usize,
+        /// Steps.
+        steps: usize,
+    },
+
+    /// The first axis looks like the steps of one recording.
+    #[error("an array of shape {shape} may be one recording: its values go on smoothly along the first axis")]
+    FirstAxisIsTime {
+        /// The shape as numpy writes it.
+        shape: String,
+    },
+
+    /// Axes that do not fit.
+    #[error("`axes = \"{axes}\"` does not fit {found}")]
+    Axes {
+        /// What was asked for.
+        axes: String,
+        /// What there is.
+        found: String,
+    },
+
+    /// An array that is asked for, but not there.
+    #[error("there is no array `{found}`")]
+    NoArray {
+        /// What is asked for.
+        found: String,
+    },
+
+    /// Arrays that do not go together.
+    #[error("its arrays differ in lengths and channels: {found}")]
+    Lengths {
+        /// The arrays with their shapes.
+        found: String,
+    },
+
     /// More or fewer bytes than the shape says.
     #[error("the array's header promises {promised} bytes, but {held} follow")]
     Size {
@@ -506,14 +562,5 @@ pub enum ArrayProblem {
         promised: String,
         /// Bytes that are there.
         held: usize,
-    },
-
-    /// Sequences on different channels.
-    #[error("{found} channels; needed: {needed}, as in the first array")]
-    Channels {
-        /// Channels of this array.
-        found: usize,
-        /// Channels of the first.
-        needed: usize,
     },
 }

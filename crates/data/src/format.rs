@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::budget::Budget;
 use crate::samples::Samples;
-use crate::{Field, FileError, Selection, mcap, npy, npz, text, text_out};
+use crate::{Field, FileError, Selection, mcap, npy, npz, table};
 
 /// One format.
 pub struct Format {
@@ -35,24 +35,24 @@ pub const FORMATS: &[Format] = &[
         extensions: &["csv"],
         folder: None,
         options: &["period"],
-        read: text::read_csv,
-        write: Some(text_out::write_csv),
+        read: table::read_csv,
+        write: Some(table::writing::write_csv),
     },
     Format {
         name: "text table",
         extensions: &["txt", "dat"],
         folder: None,
         options: &["period"],
-        read: text::read_csv,
-        write: Some(text_out::write_blocks),
+        read: table::read_csv,
+        write: Some(table::writing::write_blocks),
     },
     Format {
         name: "TSV table",
         extensions: &["tsv"],
         folder: None,
         options: &["period"],
-        read: text::read_tsv,
-        write: Some(text_out::write_tsv),
+        read: table::read_tsv,
+        write: Some(table::writing::write_tsv),
     },
     Format {
         name: "numpy array",

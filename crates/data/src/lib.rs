@@ -2,7 +2,7 @@
 //!
 //! | extension | what it holds | more |
 //! |---|---|---|
-//! | `.csv`, `.txt`, `.dat`, `.tsv` | lines of numbers, with or without a header | [`text`] |
+//! | `.csv`, `.txt`, `.dat`, `.tsv` | lines of numbers, with or without a header | [`table`] |
 //! | `.npy` | one numpy array: sequences x steps x channels, steps x channels, or steps | [`npy`] |
 //! | `.npz` | numpy arrays: sequences, or groups of channels | [`npz`] |
 //! | `.mcap` | a recording; messages of one topic are samples. Only read | [`mcap`] |
@@ -19,13 +19,14 @@ use std::path::Path;
 use scrnn::dataset::{Dataset, Sequence};
 
 pub mod angles;
+pub mod arrays;
 pub mod budget;
 mod error;
 mod excerpt;
-mod fields;
 mod files;
 pub mod format;
 mod joining;
+mod literal;
 mod mcap;
 mod npy;
 mod npz;
@@ -35,8 +36,7 @@ mod replace;
 pub mod samples;
 mod selection;
 pub mod suspicions;
-mod text;
-mod text_out;
+mod table;
 pub mod times;
 
 pub use error::{ArrayProblem, FileError, LineError, LineProblem, RecordingProblem, disk_help};
@@ -129,7 +129,7 @@ pub fn write(path: &Path, fields: &[Field<'_>]) -> Result<(), FileError> {
 
 /// The fields as a table with commas and a header, for the standard output.
 pub fn csv(fields: &[Field<'_>]) -> String {
-    text_out::csv(fields, ',')
+    table::writing::csv(fields, ',')
 }
 
 #[cfg(test)]

@@ -25,8 +25,8 @@ fn good_files_are_read_in_a_small_multiple_of_their_size() {
     let data = Dataset::new(vec!["x".into(), "y".into()], vec![sequence]).unwrap();
     let fields = [Field { name: "", data: &data }];
     let files = [
-        ("x.csv", text_out::csv(&fields, ',').into_bytes(), 10),
-        ("x.txt", text_out::blocks(&fields).into_bytes(), 10),
+        ("x.csv", table::writing::csv(&fields, ',').into_bytes(), 10),
+        ("x.txt", table::writing::blocks(&fields).into_bytes(), 10),
         ("x.npy", npy::write("x.npy", &fields).unwrap(), 5),
         ("x.npz", npz::write("x.npz", &fields).unwrap(), 5),
         ("x.mcap", mcap::tests::some_joints(), 50),

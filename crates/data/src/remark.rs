@@ -41,6 +41,20 @@ pub enum Remark {
         /// How many.
         sequences: usize,
     },
+    /// A column that is called like a clock does not behave like one.
+    #[error("`{column}` does not rise from row to row, so it is no clock; it was taken as a channel")]
+    NoClock {
+        /// The column.
+        column: String,
+    },
+    /// A counter passes over numbers: rows were lost.
+    #[error("`{column}` passes over {lost} numbers: rows may be lost")]
+    NumbersLeftOut {
+        /// The column.
+        column: String,
+        /// How many.
+        lost: usize,
+    },
     /// A column that holds no numbers was left out.
     #[error("`{column}` holds {what}, it is no channel")]
     LeftOut {
@@ -58,12 +72,14 @@ pub enum Remark {
         found: String,
     },
     /// The clock began again: a new sequence.
-    #[error("`{clock}` begins again at {place}: a new sequence")]
+    #[error("`{clock}` begins again, first at row {row}: {sequences} sequences")]
     Restart {
         /// The clock.
         clock: String,
-        /// Where, e.g. `line 12`.
-        place: String,
+        /// The first row after a restart, from 1.
+        row: usize,
+        /// How many sequences there are now.
+        sequences: usize,
     },
     /// Times are not even, and were not looked at because that was asked for.
     #[error("{found}; the rows were taken as even steps")]
@@ -155,6 +171,8 @@ impl Remark {
             | Self::Bursts { .. }
             | Self::Staircase { .. }
             | Self::ByPlace { .. }
+            | Self::NoClock { .. }
+            | Self::NumbersLeftOut { .. }
             | Self::Suspicion { .. } => Level::Warning,
             Self::MissingValues { missing, samples, .. } if 2 * missing > *samples => Level::Warning,
             _ => Level::Note,

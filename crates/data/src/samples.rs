@@ -19,6 +19,8 @@ pub struct Samples {
     pub tracks: Vec<Track>,
     /// Seconds between samples, if the file says so itself. Times of the tracks go before it.
     pub period: Option<f64>,
+    /// Nanoseconds between two times that the file can tell apart, e.g. the last digit that a table has. 0 if it is none.
+    pub resolution: i64,
     /// What is worth saying.
     pub remarks: Vec<Remark>,
     /// What is known besides. [`Samples::finish`] cuts `units` to the chosen channels and fills `gaps` and `available`.

@@ -22,6 +22,8 @@ const WIDEST_GAP: i128 = 10;
 /// Most samples that one sample may be turned into, on average.
 const MOST_PER_SAMPLE: i128 = 100;
 
+const BILLION: i128 = 1_000_000_000;
+
 /// Brings all tracks to even steps and returns the period in seconds, where it is known.
 ///
 /// # Errors
@@ -51,12 +53,16 @@ pub fn to_even_steps(path: &str, samples: &mut Samples, selection: &Selection) -
     }
     let channels = samples.channels.len();
     let wanted = selection.period_in_nanoseconds().and_then(|period| i64::try_from(period).ok());
+    let resolution = samples.resolution;
     let mut middles = Vec::new();
     for track in &mut samples.tracks {
         let Some(middle) = middle_interval(&track.times) else { continue };
-        let gaps = gaps(track, middle);
-        samples.facts.gaps.extend(gaps);
-        match (wanted, irregularity(track, middle)) {
+        let irregularity = irregularity(track, middle, resolution);
+        if irregularity.as_ref().is_some_and(|irregularity| !irregularity.wavers) {
+            let gaps = gaps(track, middle);
+            samples.facts.gaps.extend(gaps);
+        }
+        match (wanted, irregularity) {
             (Some(period), _) if !selection.ignores_time() => {
                 track.values = resampled(track, channels, period).map_err(|found| refused(&track.name, found, None))?;
                 track.times = Vec::new();
@@ -85,7 +91,9 @@ pub fn to_even_steps(path: &str, samples: &mut Samples, selection: &Selection) -
         return Ok(Some(period as f64 / 1e9));
     }
     let Some((first, middle)) = middles.first().cloned() else { return Ok(samples.period) };
-    if let Some((other, differs)) = middles.iter().find(|(_, other)| off(*other, middle) > EVEN) {
+    if let Some((other, differs)) =
+        middles.iter().find(|(_, other)| off(*other, middle) > EVEN && (*other - middle).abs() > resolution)
+    {
         let found =
             format!("samples of {first} are {} s apart, those of {other} {} s", seconds(middle), seconds(*differs));
         if !selection.ignores_time() {
@@ -93,7 +101,7 @@ pub fn to_even_steps(path: &str, samples: &mut Samples, selection: &Selection) -
         }
         samples.remarks.push(Remark::Uneven { found });
     }
-    Ok((middle > 0).then(|| mean_interval(&samples.tracks).unwrap_or(middle as f64 / 1e9)))
+    Ok(mean_interval(&samples.tracks).or((middle > 0).then_some(middle as f64 / 1e9)))
 }
 
 fn help(middle: i64) -> String {
@@ -113,12 +121,15 @@ struct Irregularity {
     wavers: bool,
 }
 
-fn irregularity(track: &Track, middle: i64) -> Option<Irregularity> {
+fn irregularity(track: &Track, middle: i64, resolution: i64) -> Option<Irregularity> {
     let intervals = || track.times.windows(2).map(|pair| pair[1].saturating_sub(pair[0]));
     if let Some(at) = intervals().position(|interval| interval < 0) {
         let (before, after) = (since(track, at), since(track, at + 1));
         let found = format!("the time falls from {before} s to {after} s after step {}", at + 1);
         return Some(Irregularity { found, wavers: false });
+    }
+    if is_rounding(&track.times, middle, resolution) {
+        return None;
     }
     if middle <= 0 {
         return Some(Irregularity { found: "most samples have the time of the one before".to_owned(), wavers: false });
@@ -135,6 +146,22 @@ fn irregularity(track: &Track, middle: i64) -> Option<Irregularity> {
         track.times.len() - 1,
     );
     (count > 0).then_some(Irregularity { found, wavers })
+}
+
+/// Whether intervals are off only because the times were written with few digits: none by more than the last of them, all
+/// times within it of a straight line, and so many that it is the rule. A lost sample is off just once.
+fn is_rounding(times: &[i64], middle: i64, resolution: i64) -> bool {
+    let (Some(&first), Some(&last), true) = (times.first(), times.last(), resolution > 0) else { return false };
+    let steps = (times.len() - 1) as f64;
+    let mean = (last as f64 - first as f64) / steps;
+    let near = |k: usize, time: i64| (time as f64 - first as f64 - k as f64 * mean).abs() <= 1.001 * resolution as f64;
+    let intervals = || times.windows(2).map(|pair| pair[1].saturating_sub(pair[0]));
+    let off_count = intervals().filter(|&interval| off(interval, middle) > EVEN).count();
+    let by_digits = intervals().all(|interval| (interval - middle).abs() <= resolution);
+    mean > 0.0
+        && by_digits
+        && off_count as f64 >= 0.05 * steps
+        && times.iter().enumerate().all(|(k, &time)| near(k, time))
 }
 
 /// Seconds since the first sample.
@@ -236,4 +263,49 @@ pub fn seconds(nanoseconds: i64) -> String {
     let (whole, rest) = (nanoseconds.unsigned_abs() / 1_000_000_000, nanoseconds.unsigned_abs() % 1_000_000_000);
     let text = format!("{sign}{whole}.{rest:09}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+/// Times in any unit as nanoseconds since the first, the unit found by their size and steps. None if they cannot be times.
+#[must_use]
+pub fn nanoseconds(values: &[f64]) -> Option<Vec<i64>> {
+    if values.iter().any(|value| value.is_nan() || value.abs() > 1e19) {
+        return None;
+    }
+    let billionths: Vec<i128> = values.iter().map(|value| (value * 1e9).round() as i128).collect();
+    let first = billionths.first().copied()?;
+    let (unit, _) = unit_of(&billionths, &vec![0; billionths.len()]);
+    billionths.iter().map(|time| i64::try_from((time - first).checked_mul(unit)? / BILLION).ok()).collect()
+}
+
+/// Nanoseconds in what is counted, by how large the times and their steps are, and whether it had to be guessed. Times are
+/// in billionths of the unit; `track` tells the sequence of each.
+pub(crate) fn unit_of(times: &[i128], track: &[u32]) -> (i128, bool) {
+    let largest = times.iter().map(|time| (time / BILLION).unsigned_abs()).max().unwrap_or(0);
+    // Since 1970, counted in s, a time has 10 digits; this century no other unit comes near.
+    match largest {
+        900_000_000_000_000_000.. => return (1, false),
+        900_000_000_000_000..=5_000_000_000_000_000 => return (1000, false),
+        900_000_000_000..=5_000_000_000_000 => return (1_000_000, false),
+        _ => {}
+    }
+    if times.iter().any(|time| time % BILLION != 0) {
+        return (BILLION, false);
+    }
+    let mut steps: Vec<i128> = times
+        .windows(2)
+        .zip(track.windows(2))
+        .filter(|(times, track)| track[0] == track[1] && times[1] > times[0])
+        .map(|(times, _)| (times[1] - times[0]) / BILLION)
+        .collect();
+    let middle = steps.len() / 2;
+    if steps.is_empty() {
+        return (BILLION, false);
+    }
+    // Whole numbers: movements are recorded at one to ten thousand samples a second.
+    match *steps.select_nth_unstable(middle).1 {
+        ..=1 => (BILLION, false),
+        2..=1999 => (1_000_000, true),
+        2000..=999_999 => (1000, true),
+        _ => (1, true),
+    }
 }

@@ -1,11 +1,11 @@
-//! Tables as text, such that [`super::text`] reads the same data again.
+//! Tables as text, such that [`super`] reads the same data again.
 
 use std::collections::HashSet;
 use std::fmt::Write;
 
 use scrnn::dataset::Dataset;
 
-use super::{Field, FileError};
+use crate::{Field, FileError};
 
 /// The bytes of a `.csv`.
 pub fn write_csv(_: &str, fields: &[Field<'_>]) -> Result<Vec<u8>, FileError> {
