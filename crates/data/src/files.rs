@@ -157,3 +157,67 @@ fn one_of(set: &[char], c: char) -> Option<(bool, usize)> {
     }
     Some((found != negated, end + 1))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_in_the_order_people_mean() {
+        let mut names = ["demo_10", "demo_2", "demo_1", "b", "demo_02", "a10b1", "a9", "demo_", "\u{e9}2", "\u{e9}10"];
+        names.sort_by(|a, b| natural(a, b));
+        assert_eq!(
+            names,
+            ["a9", "a10b1", "b", "demo_", "demo_1", "demo_02", "demo_2", "demo_10", "\u{e9}2", "\u{e9}10"]
+        );
+        assert_eq!(natural("9", "99999999999999999999999"), Ordering::Less);
+    }
+
+    #[test]
+    fn patterns_fit_as_in_a_shell() {
+        for (pattern, name) in [
+            ("demo_*.csv", "demo_1.csv"),
+            ("*", "a"),
+            ("a?c", "abc"),
+            ("[a-c]x", "bx"),
+            ("[!a]x", "bx"),
+            ("*a*b", "aaab"),
+            ("[]]", "]"),
+            ("[", "["),
+        ] {
+            assert!(fits(pattern, name), "{pattern} {name}");
+        }
+        for (pattern, name) in
+            [("demo_*.csv", "demo_1.txt"), ("a?c", "ac"), ("[a-c]x", "dx"), ("[!a]x", "ax"), ("", "a"), ("*a", "ab")]
+        {
+            assert!(!fits(pattern, name), "{pattern} {name}");
+        }
+        // Not exponential.
+        assert!(!fits(&"*a".repeat(200), &"a".repeat(150)));
+    }
+
+    #[test]
+    fn folders_and_patterns_name_their_files() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["demo_10.csv", "demo_2.csv", "notes.md", ".hidden.csv", "other.npy"] {
+            std::fs::write(folder.path().join(name), "").unwrap();
+        }
+        let names = |pattern: &str| {
+            let found = expand(&folder.path().join(pattern)).unwrap();
+            found.iter().map(|path| path.file_name().unwrap().to_string_lossy().into_owned()).collect::<Vec<_>>()
+        };
+        assert_eq!(names("demo_*"), ["demo_2.csv", "demo_10.csv"]);
+        assert_eq!(names(""), ["demo_2.csv", "demo_10.csv", "other.npy"]);
+        for sub in ["part_1", "part_10", "part_9"] {
+            std::fs::create_dir(folder.path().join(sub)).unwrap();
+            std::fs::write(folder.path().join(sub).join(format!("{sub}.npz")), "").unwrap();
+        }
+        assert_eq!(names("part_*/*.np[xz]"), ["part_1.npz", "part_9.npz", "part_10.npz"]);
+        assert_eq!(names("none.csv"), ["none.csv"]);
+        assert!(matches!(expand(&folder.path().join("none*")), Err(FileError::NoMatch { .. })));
+        std::fs::create_dir(folder.path().join("empty")).unwrap();
+        assert!(
+            expand(&folder.path().join("empty")).unwrap_err().to_string().starts_with("no data file is in this folder")
+        );
+    }
+}

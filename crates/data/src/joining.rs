@@ -23,11 +23,11 @@ pub fn read_all<P: AsRef<Path>>(patterns: &[P], selection: &Selection) -> Result
     for path in &paths {
         readings.push((path.as_path(), inspect(path, selection)?));
     }
-    join(readings)
+    join(readings, selection.ignores_time())
 }
 
 /// The readings of several files as one.
-fn join(mut readings: Vec<(&Path, Reading)>) -> Result<Reading, FileError> {
+fn join(mut readings: Vec<(&Path, Reading)>, any_period: bool) -> Result<Reading, FileError> {
     if readings.len() == 1
         && let Some((_, only)) = readings.pop()
     {
@@ -46,6 +46,7 @@ fn join(mut readings: Vec<(&Path, Reading)>) -> Result<Reading, FileError> {
     for ((path, reading), stem) in readings.iter().zip(&stems) {
         let columns = columns(path, reading, first, &channels, model.facts.named, &mut remarks)?;
         if let (Some(a), Some(b)) = (period, reading.period)
+            && !any_period
             && (a / b - 1.0).abs() > 0.1
         {
             return Err(FileError::Times {

@@ -5,6 +5,7 @@
 
 use scrnn::dataset::{Dataset, Sequence};
 
+use crate::angles;
 use crate::reading::{Facts, Reading};
 use crate::remark::Remark;
 use crate::times;
@@ -114,8 +115,10 @@ impl Samples {
                 found: name.clone(),
                 channels: self.channels.join(", "),
             })?;
+            let values = self.tracks.iter().flat_map(|track| track.values.iter().skip(column).step_by(channels));
+            let turn = angles::turn(values.copied());
             for track in &mut self.tracks {
-                crate::angles::unwrap(track.values.iter_mut().skip(column).step_by(channels));
+                angles::unwrap(turn, track.values.iter_mut().skip(column).step_by(channels));
             }
         }
         Ok(())

@@ -18,7 +18,7 @@ pub struct Selection {
     pub arrays: Vec<String>,
     /// What the axes of an array are.
     pub axes: Option<Axes>,
-    /// Channels that are angles in radians: their jumps of a whole turn are taken out.
+    /// Channels that are angles, in radians or degrees: their jumps of a whole turn are taken out.
     pub unwrap: Vec<String>,
     /// What is done about missing values.
     pub missing: Missing,

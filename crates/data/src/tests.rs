@@ -189,7 +189,7 @@ fn garbage_never_makes_a_reader_panic() {
     let npy = [npy::write("x.npy", &fields).unwrap()];
     let member = npy::array_bytes(&[2, 2], [1.0, 2.0, 3.0, 4.0].into_iter());
     let npz = [npz::write("x.npz", &fields).unwrap(), archive(&[("a.npy", member)])];
-    let words = "1 2.5 , ; \t \n \r \" # \"\" - . e9 nan inf NA a sequence time \u{e9} columns: # sequence: \u{feff}";
+    let words = "1 2.5 , ; \t \n \r \" # \"\" - . e9 nan inf NA a sequence time frame episode sec nsec True [1 2] 10:00 2024-05-01T10:00:00Z 1,5 % sep=; deg \u{e9} columns: # sequence: \u{feff}";
     let mut pieces: Vec<&[u8]> = words.split(' ').map(str::as_bytes).collect();
     pieces.extend([&b" "[..], b"\n", b"\xff", b"\n1,2\n"]);
     let header = "{ } ( ) , : 'descr' 'fortran_order' 'shape' '<f8' '|u1' True False 99999999999999999999 3 L";

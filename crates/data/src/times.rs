@@ -105,7 +105,11 @@ pub fn to_even_steps(path: &str, samples: &mut Samples, selection: &Selection) -
 }
 
 fn help(middle: i64) -> String {
-    let period = seconds(middle.max(1));
+    // Three digits of a jittering clock are enough, as long as they say the same.
+    let digits = (middle.max(1) as f64).log10().floor() as i32 - 2;
+    let unit = 10_i64.pow(digits.clamp(0, 16) as u32);
+    let rounded = (middle + unit / 2) / unit * unit;
+    let period = seconds(if off(rounded, middle) < 0.01 { rounded.max(1) } else { middle.max(1) });
     format!("`period = {period}` brings them to even times; `time = \"rows\"` takes them as even steps all the same")
 }
 
@@ -272,9 +276,11 @@ pub fn nanoseconds(values: &[f64]) -> Option<Vec<i64>> {
         return None;
     }
     let billionths: Vec<i128> = values.iter().map(|value| (value * 1e9).round() as i128).collect();
-    let first = billionths.first().copied()?;
+    let first = values.first().copied()?;
     let (unit, _) = unit_of(&billionths, &vec![0; billionths.len()]);
-    billionths.iter().map(|time| i64::try_from((time - first).checked_mul(unit)? / BILLION).ok()).collect()
+    // The difference first: it is exact where the times are large.
+    let nanoseconds = |value: &f64| Some(((value - first) * unit as f64).round()).filter(|time| time.abs() < 9.2e18);
+    values.iter().map(|value| nanoseconds(value).map(|time| time as i64)).collect()
 }
 
 /// Nanoseconds in what is counted, by how large the times and their steps are, and whether it had to be guessed. Times are
@@ -307,5 +313,92 @@ pub(crate) fn unit_of(times: &[i128], track: &[u32]) -> (i128, bool) {
         2..=1999 => (1_000_000, true),
         2000..=999_999 => (1000, true),
         _ => (1, true),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One track of one channel with the number of each sample as its value.
+    fn track(times: &[i64]) -> Track {
+        let values = (0..times.len()).map(|k| k as f64).collect();
+        Track { name: "a".into(), values, times: times.iter().map(|time| time * 1_000_000).collect() }
+    }
+
+    /// In milliseconds: the values and the period, or what is said.
+    fn even(tracks: &[&[i64]], period: Option<f64>, resolution: i64) -> Result<(Vec<f64>, Option<f64>), String> {
+        let tracks = tracks.iter().map(|times| track(times)).collect();
+        let mut samples =
+            Samples { channels: vec!["y".into()], tracks, resolution: resolution * 1_000_000, ..Samples::default() };
+        let selection = Selection { period, ..Selection::default() };
+        let period = to_even_steps("x", &mut samples, &selection).map_err(|error| error.to_string())?;
+        assert!(samples.remarks.is_empty() || period.is_some());
+        Ok((samples.tracks.remove(0).values, period))
+    }
+
+    #[test]
+    fn a_little_jitter_is_even() {
+        assert_eq!(even(&[&[0, 100, 205, 300]], None, 0), Ok((vec![0., 1., 2., 3.], Some(0.1))));
+        assert_eq!(even(&[&[5]], None, 0), Ok((vec![0.0], None)));
+        // Off by a third: taken, and said.
+        assert_eq!(even(&[&[0, 100, 230, 300, 400]], None, 0), Ok((vec![0., 1., 2., 3., 4.], Some(0.1))));
+    }
+
+    #[test]
+    fn gaps_falls_and_other_rates_are_refused() {
+        let said = |tracks: &[&[i64]]| even(tracks, None, 0).unwrap_err();
+        assert!(said(&[&[0, 100, 200, 500, 600]]).contains("0.3 s after step 3 (at 0.2 s; 1 of 4 intervals"));
+        assert!(said(&[&[0, 100, 50, 150, 250]]).contains("falls from 0.1 s to 0.05 s after step 2"));
+        assert!(said(&[&[0, 100, 200], &[0, 50, 100]]).contains("0.1 s apart, those of a 0.05 s"));
+        assert!(said(&[&[0, 0, 0, 100]]).contains("the time of the one before"));
+    }
+
+    #[test]
+    fn a_period_resamples_on_straight_lines() {
+        assert_eq!(even(&[&[0, 100, 300]], Some(0.05), 0), Ok((vec![0., 0.5, 1., 1.25, 1.5, 1.75, 2.], Some(0.05))));
+        assert_eq!(even(&[&[0, 100, 200], &[0, 50, 100]], Some(0.1), 0).unwrap().0, [0., 1., 2.]);
+        let wide = even(&[&[0, 100, 200, 1400]], Some(0.1), 0).unwrap_err();
+        assert!(wide.contains("between 0.2 s and 1.4 s, which is too long to be bridged"), "{wide}");
+        assert!(even(&[&[0, 100]], Some(1e-9), 0).unwrap_err().contains("would become 100000001"));
+        assert!(even(&[&[0, 100, 50]], Some(0.1), 0).unwrap_err().contains("falls"));
+    }
+
+    #[test]
+    fn what_is_missing_stays_missing_on_the_lines_to_it() {
+        let mut track = track(&[0, 100, 200, 300]);
+        track.values[1] = f64::NAN;
+        let values = resampled(&track, 1, 50_000_000).unwrap();
+        let missing: Vec<bool> = values.iter().map(|value| value.is_nan()).collect();
+        assert_eq!(missing, [false, true, true, true, false, false, false]);
+    }
+
+    #[test]
+    fn times_of_few_digits_are_told_from_gaps() {
+        // 125 samples a second, written in hundredths.
+        let rounded: Vec<i64> = (0..200).map(|k| (k * 8 + 5) / 10 * 10).collect();
+        assert_eq!(even(&[&rounded], None, 10).unwrap().1.map(|period| (period * 1000.0).round()), Some(8.0));
+        // A hundred a second, one lost.
+        let lost: Vec<i64> = (0..200).map(|k| 10 * (k + i64::from(k > 90))).collect();
+        assert!(even(&[&lost], None, 10).unwrap_err().contains("0.02 s after step 91"));
+    }
+
+    #[test]
+    fn even_samples_can_be_resampled_by_their_period() {
+        let tracks = vec![Track { name: "a".into(), values: vec![0., 1., 2., 3.], times: Vec::new() }];
+        let mut samples = Samples { channels: vec!["y".into()], tracks, period: Some(0.1), ..Samples::default() };
+        let selection = Selection { period: Some(0.15), ..Selection::default() };
+        assert_eq!(to_even_steps("x", &mut samples, &selection).unwrap(), Some(0.15));
+        assert_eq!(samples.tracks[0].values, [0.0, 1.5, 3.0]);
+        samples.period = None;
+        assert!(matches!(to_even_steps("x", &mut samples, &selection), Err(FileError::NoClock { .. })));
+    }
+
+    #[test]
+    fn numbers_are_times_in_the_unit_of_their_size() {
+        assert_eq!(nanoseconds(&[1.5, 1.52]), Some(vec![0, 20_000_000]));
+        assert_eq!(nanoseconds(&[1.766e18, 1.766e18 + 2e7]), Some(vec![0, 20_000_000]));
+        assert_eq!(nanoseconds(&[f64::NAN]), None);
+        assert_eq!(nanoseconds(&[0.0, 0.5, 1e11]), None);
     }
 }

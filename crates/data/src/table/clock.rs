@@ -1,13 +1,14 @@
 //! Which columns tell the time, by their names and by how their values behave, and in which unit.
 
+use std::collections::HashMap;
+
 use crate::remark::Remark;
 
 use crate::times::unit_of;
 
-use super::dates::Moment;
 use super::header::Layout;
 use super::roles::{Role, nanoseconds_in, without_unit};
-use super::rows::{NO_TIME, Plan, Rows};
+use super::rows::{NO_TIME, Plan, Rows, Shape};
 
 const BILLION: i128 = 1_000_000_000;
 
@@ -46,7 +47,7 @@ pub fn restarts(start: f64, from: f64, to: f64) -> bool {
 pub fn course(values: impl Iterator<Item = f64>, track: &[u32]) -> Course {
     let mut course = Course::default();
     // Start and latest value of the sequence that the latest row was of; sequences seldom interleave.
-    let mut open: std::collections::HashMap<u32, (f64, f64)> = std::collections::HashMap::new();
+    let mut open: HashMap<u32, (f64, f64)> = HashMap::new();
     for (value, &track) in values.zip(track) {
         let (start, before) = open.entry(track).or_insert((value, f64::NAN));
         if value > *before {
@@ -134,6 +135,14 @@ fn candidates(layout: &Layout, plans: &[Plan], rows: &Rows) -> Vec<Candidate> {
         };
         a.iter().zip(b).map(sum).collect()
     };
+    let nanoseconds: HashMap<&str, usize> = plans
+        .iter()
+        .enumerate()
+        .filter_map(|(index, plan)| match &plan.role {
+            Some(Role::Nanoseconds(stem)) => Some((stem.as_str(), index)),
+            _ => None,
+        })
+        .collect();
     for (index, plan) in plans.iter().enumerate() {
         let kept = &rows.columns[index];
         if kept.times.is_empty() {
@@ -141,8 +150,11 @@ fn candidates(layout: &Layout, plans: &[Plan], rows: &Rows) -> Vec<Candidate> {
         }
         // Seconds and nanoseconds in two columns.
         if let Some(Role::Seconds(stem)) = &plan.role {
-            let other = plans.iter().position(|other| other.role == Some(Role::Nanoseconds(stem.clone())));
-            if let Some(other) = other.filter(|&other| rows.columns[other].times.len() == kept.times.len()) {
+            if let Some(other) = nanoseconds
+                .get(stem.as_str())
+                .copied()
+                .filter(|&other| rows.columns[other].times.len() == kept.times.len())
+            {
                 let times = added(&kept.times, &rows.columns[other].times, BILLION);
                 let stamp = stem.contains("stamp");
                 candidates.push(Candidate {
@@ -157,7 +169,7 @@ fn candidates(layout: &Layout, plans: &[Plan], rows: &Rows) -> Vec<Candidate> {
             }
         }
         // A day and a time of day.
-        if let (Some(Moment::Day(_)), Some(Moment::Clock(_))) =
+        if let (Some(Shape::Day), Some(Shape::Clock)) =
             (kept.moment, rows.columns.get(index + 1).and_then(|next| next.moment))
         {
             let next = &rows.columns[index + 1];
@@ -180,12 +192,12 @@ fn candidates(layout: &Layout, plans: &[Plan], rows: &Rows) -> Vec<Candidate> {
         }
         let (mut times, mut unit) = (kept.times.clone(), None);
         match kept.moment {
-            Some(Moment::Day(_)) => continue,
-            Some(Moment::Clock(_)) => {
+            Some(Shape::Day) => continue,
+            Some(Shape::Clock) => {
                 past_midnight(&mut times);
                 unit = Some(BILLION);
             }
-            Some(Moment::Stamp(_)) => unit = Some(BILLION),
+            Some(Shape::Stamp) => unit = Some(BILLION),
             None => {}
         }
         let sure = kept.moment.is_some() || matches!(plan.role, Some(Role::Clock { sure: true }));

@@ -73,13 +73,22 @@ pub fn split<'a>(line: &'a str, separator: Separator, into: &mut Vec<Field<'a>>)
     };
     let pads_field = |c: char| c.is_whitespace() && separator != Separator::Character(c);
     let mut at = 0;
+    // Where no bracket closes any more, none is looked for again: the time is that of the line's length.
+    let mut lists_end = true;
     loop {
         let start = at + (line.len() - at - line[at..].trim_start_matches(pads_field).len());
         if start == line.len() && separator == Separator::Whitespace {
             return;
         }
         let closing = line[start..].strip_prefix('"').and_then(closing_quote).map(|length| start + 1 + length);
-        let list = line[start..].strip_prefix('[').and_then(|rest| rest.find(']')).map(|length| start + 1 + length);
+        let list = match line[start..].strip_prefix('[') {
+            Some(rest) if lists_end => {
+                let end = rest.find(']');
+                lists_end = end.is_some();
+                end.map(|length| start + 1 + length)
+            }
+            _ => None,
+        };
         let searched = closing.or(list).map_or(start, |closing| closing + 1);
         let end = line[searched..].find(ends_field).map_or(line.len(), |length| searched + length);
         let trimmed = start + line[start..end].trim_end().len();

@@ -63,7 +63,7 @@ fn read(source: &Source<'_>, order: DetectionOrder, selection: &Selection) -> Re
     if rows.count == 0 {
         return Err(FileError::Empty { path: path.to_owned() });
     }
-    let (bad, trailing): (Vec<[Option<Bad>; 2]>, usize) =
+    let (bad, trailing): (Vec<[Option<Box<Bad>>; 2]>, usize) =
         (rows.columns.iter().map(|kept| kept.bad.clone()).collect(), rows.trailing_comments);
     let asked = selection.channels.is_some();
     let assembly = assemble(&layout, &plans, rows, source.budget(), asked).map_err(over)?;
@@ -149,12 +149,12 @@ impl Table<'_> {
         &self,
         assembly: &Assembly,
         plans: &[Plan],
-        bad: Vec<[Option<Bad>; 2]>,
+        bad: Vec<[Option<Box<Bad>>; 2]>,
         selection: &Selection,
     ) -> Option<FileError> {
         let wrong = |bad: &Bad| bad.value != Value::Missing || selection.refuses_missing();
         let of_channels = assembly.channels.iter().flat_map(|&index| {
-            bad[index].iter().flatten().filter(|bad| wrong(bad)).map(move |bad| (index, bad.clone()))
+            bad[index].iter().flatten().filter(|bad| wrong(bad)).map(move |bad| (index, (**bad).clone()))
         });
         let (index, bad) = of_channels.min_by_key(|(index, bad)| (bad.row, *index))?;
         let channel = shortened(&plans[index].name);

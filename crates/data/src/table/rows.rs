@@ -61,7 +61,7 @@ pub struct Kept {
     /// Most digits behind the point among the times.
     pub decimals: usize,
     /// What kind of moments there were, if any: the first.
-    pub moment: Option<Moment>,
+    pub moment: Option<Shape>,
     /// For each row the place of its label in `texts`.
     pub labels: Vec<u32>,
     /// The labels, each once, in the order of the rows.
@@ -69,7 +69,18 @@ pub struct Kept {
     /// Whether any number was there.
     pub any: bool,
     /// The first cell that is missing or infinite, and the first that is no number at all.
-    pub bad: [Option<Bad>; 2],
+    pub bad: [Option<Box<Bad>>; 2],
+}
+
+/// What kind of moment stands in a cell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shape {
+    /// A day with a time.
+    Stamp,
+    /// A day.
+    Day,
+    /// A time of day.
+    Clock,
 }
 
 /// All rows.
@@ -319,8 +330,13 @@ impl Kept {
     fn note(&mut self, value: Value, text: &str, (row, line, span): (usize, &Line<'_>, Range<usize>)) {
         let bad = &mut self.bad[usize::from(value == Value::Other)];
         if bad.is_none() {
-            *bad =
-                Some(Bad { row, line: (line.number, line.start), span, value, found: crate::excerpt::shortened(text) });
+            *bad = Some(Box::new(Bad {
+                row,
+                line: (line.number, line.start),
+                span,
+                value,
+                found: crate::excerpt::shortened(text),
+            }));
         }
     }
 
@@ -337,7 +353,11 @@ impl Kept {
                 time
             }
             (None, Some(found)) => {
-                self.moment.get_or_insert(found);
+                self.moment.get_or_insert(match found {
+                    Moment::Stamp(_) => Shape::Stamp,
+                    Moment::Day(_) => Shape::Day,
+                    Moment::Clock(_) => Shape::Clock,
+                });
                 let digits = text.rsplit(['.', ',']).next().filter(|rest| rest.len() < text.len());
                 let digits = digits.map_or(0, |rest| rest.bytes().take_while(u8::is_ascii_digit).count());
                 self.decimals = self.decimals.max(digits.min(9));
