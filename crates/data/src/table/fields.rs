@@ -3,6 +3,8 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
+use super::numbers::{Value, has_decimal_comma};
+
 /// What stands between two fields.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Separator {
@@ -40,7 +42,13 @@ impl Separator {
             }
         }
         let found = candidates.into_iter().zip(outside).find(|(_, found)| *found);
-        found.map_or(Self::Whitespace, |(candidate, _)| Self::Character(candidate))
+        let found = found.map_or(Self::Whitespace, |(candidate, _)| Self::Character(candidate));
+        // Between tabs or spaces, commas may be decimal ones: if all that stands there are numbers then.
+        if found == Self::Character(',') {
+            let others = [Self::Character('\t'), Self::Whitespace];
+            return others.into_iter().find(|&other| has_decimal_commas(line, other)).unwrap_or(found);
+        }
+        found
     }
 
     /// Its name in messages.
@@ -52,6 +60,15 @@ impl Separator {
             Self::Whitespace => "spaces or tabs",
         }
     }
+}
+
+/// Whether the line has several fields between these separators, all of them numbers, some with a decimal comma.
+fn has_decimal_commas(line: &str, separator: Separator) -> bool {
+    let mut fields = Vec::new();
+    split(line, separator, &mut fields);
+    let with_comma = |field: &Field<'_>| has_decimal_comma(&field.text);
+    let is_number = |field: &Field<'_>| with_comma(field) || matches!(Value::of(&field.text), Value::Number(_));
+    fields.len() > 1 && fields.iter().any(with_comma) && fields.iter().all(is_number)
 }
 
 /// One field of a line.
@@ -136,6 +153,9 @@ mod tests {
         assert_eq!(detect("1,5;2,5"), Separator::Character(';'));
         assert_eq!(detect("1\t2"), Separator::Character('\t'));
         assert_eq!(detect("1,\t2"), Separator::Character(','));
+        assert_eq!(detect("40,038\t53,489"), Separator::Character('\t'));
+        assert_eq!(detect("1, 2"), Separator::Character(','));
+        assert_eq!(detect("1,5 2,5"), Separator::Whitespace);
         assert_eq!(detect("\"a, b\" 2"), Separator::Whitespace);
         assert_eq!(Separator::detect("a, b\t2", DetectionOrder::TabFirst), Separator::Character('\t'));
     }

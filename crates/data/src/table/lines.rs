@@ -28,6 +28,8 @@ impl<'a> Line<'a> {
         let text = self.text.trim();
         match text.strip_prefix(['#', '%']) {
             _ if text.is_empty() => Kind::Blank,
+            // `rostopic echo -p` calls its first column so.
+            Some(comment) if text.starts_with("%time") => Kind::Comment(&text[text.len() - comment.len() - 1..]),
             Some(comment) => Kind::Comment(comment.trim()),
             None => Kind::Content,
         }
