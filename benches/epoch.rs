@@ -1,7 +1,7 @@
 //! One epoch of learning: evaluation of all sequences, gradient, update; in time steps a second.
 //!
 //! ```text
-//! cargo bench -p scrnn --bench epoch [-- lissajous]
+//! cargo bench -p scrnn-checks --bench epoch [-- lissajous]
 //! ```
 //!
 //! The first five are the tasks of the thesis at their sizes; the others vary one size of the first task. Shares of the
@@ -14,8 +14,8 @@ use std::time::Duration;
 use criterion::{BenchmarkId, Criterion, SamplingMode, Throughput};
 use scrnn::dataset::Dataset;
 use scrnn::engine::InstructionSet;
-use scrnn::tasks::{limit_cycle, lissajous, sinusoid};
 use scrnn::topology::{Group, Prediction, Topology};
+use scrnn_tasks::{limit_cycle, lissajous, sinusoid};
 use training::{Training, waves};
 
 const THREADS: [usize; 2] = [1, 2];

@@ -1,7 +1,7 @@
 //! What a robot waits for: one control step of error regression.
 //!
 //! ```text
-//! cargo bench -p scrnn --bench error_regression [-- [--only 30] [--json] [--rounds 300] [--instruction-set avx2]]
+//! cargo bench -p scrnn-checks --bench error_regression [-- [--only 30] [--json] [--rounds 300] [--instruction-set avx2]]
 //! ```
 //!
 //! An S-CTRNN of 60 units on 2 channels regresses 100 times over windows of 10, 30 and 100 steps; an S-MTRNN as in the
@@ -15,6 +15,7 @@ use std::time::Instant;
 
 use arguments::Arguments;
 use machine::{median, peak_gflops};
+use scrnn::engine::Engine;
 use scrnn::error_regression::{Ascent, ErrorRegression, ErrorRegressionOptions};
 use scrnn::initialization::initialize;
 use scrnn::topology::{Group, Prediction, Topology};
@@ -58,13 +59,17 @@ impl Case {
     fn seconds(&self, arguments: &Arguments, count: usize) -> Vec<f64> {
         let (network, states) = initialize(&self.topology, 1, 1);
         let channels = self.topology.channels();
-        let options = ErrorRegressionOptions {
-            window: self.window,
-            iterations: self.iterations,
-            ascent: Ascent::Adam { rate: 0.01 },
-            ..ErrorRegressionOptions::new(channels)
-        };
-        let regression = ErrorRegression::new(&network, states.sequence(0), options, arguments.set);
+        let options = ErrorRegressionOptions::with(channels, |it| {
+            it.window = self.window;
+            it.iterations = self.iterations;
+            it.ascent = Ascent::Adam { rate: 0.01 };
+        });
+        let regression = ErrorRegression::new(
+            &network,
+            states.sequence(0),
+            options,
+            &Engine::new(1, arguments.set).expect("this processor has it"),
+        );
         let mut regression = regression.expect("options in their range");
         let full = self.window + self.topology.delay();
         let mut seconds = Vec::with_capacity(count);

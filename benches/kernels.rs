@@ -1,7 +1,7 @@
 //! The kernels by themselves, as shares of the peak that is measured in the same run, and the same products by nalgebra.
 //!
 //! ```text
-//! cargo bench -p scrnn --bench kernels [-- [--rounds 9] [--instruction-set avx2]]
+//! cargo bench -p scrnn-checks --bench kernels [-- [--rounds 9] [--instruction-set avx2]]
 //! ```
 
 mod arguments;

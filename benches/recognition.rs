@@ -1,7 +1,7 @@
 //! Recognition at the thesis' size: 12 sequences of 1000 steps, 20 starts each, 60 units.
 //!
 //! ```text
-//! cargo bench -p scrnn --bench recognition [-- [--full] [--rounds 5] [--instruction-set avx2]]
+//! cargo bench -p scrnn-checks --bench recognition [-- [--full] [--rounds 5] [--instruction-set avx2]]
 //! ```
 //!
 //! What an epoch costs is the difference between a long and a short recognition; 300 epochs are extrapolated from it.
@@ -20,8 +20,8 @@ use scrnn::initial_states::InitialStates;
 use scrnn::initialization::initialize;
 use scrnn::network::Network;
 use scrnn::recognition::{RecognitionOptions, recognize};
-use scrnn::tasks::lissajous;
 use scrnn::topology::Topology;
+use scrnn_tasks::lissajous;
 
 /// Epochs of the short and of the long recognition, and those of the thesis.
 const EPOCHS: [u64; 3] = [2, 12, 300];
@@ -66,7 +66,10 @@ fn main() {
 
 /// Seconds of one recognition.
 fn seconds(network: &Network, learned: &InitialStates, data: &Dataset, engine: &Engine, epochs: u64) -> f64 {
-    let options = RecognitionOptions { starts: STARTS, epochs, ..RecognitionOptions::default() };
+    let options = RecognitionOptions::with(|it| {
+        it.starts = STARTS;
+        it.epochs = epochs;
+    });
     let start = Instant::now();
     let results = recognize(network, learned, data, &options, engine).expect("data made for the network");
     assert_eq!(results.len(), data.sequences().len());

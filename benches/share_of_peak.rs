@@ -1,7 +1,7 @@
 //! Epochs as shares of the machine's peak, beside the plain nalgebra path, and how their cost grows.
 //!
 //! ```text
-//! cargo bench -p scrnn --bench share_of_peak
+//! cargo bench -p scrnn-checks --bench share_of_peak
 //!     [-- [--only lissajous|grid|steps] [--json] [--rounds 5] [--instruction-set avx2]]
 //! ```
 //!
@@ -16,6 +16,7 @@ mod machine;
 mod plain_nalgebra;
 mod training;
 
+use std::ops::ControlFlow;
 use std::time::Duration;
 
 use arguments::Arguments;
@@ -25,9 +26,9 @@ use scrnn::dataset::Dataset;
 use scrnn::engine::InstructionSet;
 use scrnn::initialization::initialize;
 use scrnn::kernels::padded;
-use scrnn::learning::{Control, EpochReport, Learner};
-use scrnn::tasks::lissajous;
+use scrnn::learning::{EpochReport, Learner};
 use scrnn::topology::Topology;
+use scrnn_tasks::lissajous;
 use serde_json::{Value, json};
 use training::{Training, waves};
 
@@ -173,14 +174,14 @@ fn measure(shape: Shape, data: &Dataset, rounds: usize, set: InstructionSet) -> 
 /// Both paths must compute the same thing.
 fn agree(learner: &mut Learner, plain: &plain_nalgebra::Gradient) {
     let close = |a: f64, b: f64| (a - b).abs() <= 1e-9 * b.abs();
-    learner.run(&mut |report: &EpochReport, _: &Learner| {
+    let _ = learner.run(&mut |report: &EpochReport, _: &Learner| {
         let (ours, theirs) = (report.ln_likelihood, plain.ln_likelihood);
         assert!(close(ours, theirs), "ln L is {ours}, by nalgebra {theirs}");
         // The report's length is for one step and channel.
         let terms = -report.ln_likelihood / report.nll.expect("an S-CTRNN has variance units");
         let (ours, theirs) = (report.gradient_norm, plain.norm() / terms);
         assert!(close(ours, theirs), "the gradient is {ours} long, by nalgebra {theirs}");
-        Control::Stop
+        ControlFlow::Break(())
     });
 }
 

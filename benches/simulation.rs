@@ -2,7 +2,7 @@
 //! six seconds of simulated time.
 //!
 //! ```text
-//! cargo bench -p scrnn-sim --bench simulation
+//! cargo bench -p scrnn-checks --bench simulation
 //! ```
 //!
 //! Throughput is in simulated seconds a second, so that it is how many times faster than real time the loop runs.
@@ -11,14 +11,14 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use scrnn::engine::InstructionSet;
+use scrnn::engine::Engine;
 use scrnn::initialization::initialize;
 use scrnn::scaling::Scaling;
 use scrnn::topology::Topology;
-use scrnn_sim::agent::{NetworkDriver, Noise, Performance, Replay, perform_unseen};
-use scrnn_sim::nao;
-use scrnn_sim::reaching::{CYCLE, PERIOD, POSITIONS, retracted_arm, touching_arm};
-use scrnn_sim::tutor::{Tutoring, demonstrate};
+use scrnn_sim::reach::agent::{NetworkDriver, Noise, Performance, Replay, perform_unobserved};
+use scrnn_sim::reach::stage::{CYCLE, PERIOD, POSITIONS, retracted_arm, touching_arm};
+use scrnn_sim::reach::tutor::{Tutoring, demonstrate};
+use scrnn_sim::robot::nao;
 use scrnn_sim::world::WorldOptions;
 
 fn performance() -> Performance {
@@ -36,10 +36,10 @@ fn simulation(criterion: &mut Criterion) {
     let scaling = Scaling::new(vec![0.0; 6], vec![1.0; 6]).expect("scales other than 0");
     group.bench_function("closed_loop", |bencher| {
         bencher.iter(|| {
-            let set = InstructionSet::best();
-            let driver = NetworkDriver::new(&network, states.mean(), &scaling, &Noise::Predicted, 1, set);
+            let engine = Engine::serial();
+            let driver = NetworkDriver::new(&network, states.mean(), &scaling, &Noise::Predicted, 1, &engine);
             let mut driver = driver.expect("a network on six channels");
-            black_box(perform_unseen(&performance(), &mut driver).expect("a stage with a robot"))
+            black_box(perform_unobserved(&performance(), &mut driver).expect("a stage with a robot"))
         });
     });
 
@@ -52,7 +52,7 @@ fn simulation(criterion: &mut Criterion) {
         bencher.iter(|| {
             let arms = [[far; CYCLE / 2], [near; CYCLE / 2]].concat();
             let mut driver = Replay::new(arms).expect("twelve arms");
-            let performed = perform_unseen(&performance(), &mut driver).expect("a stage with a robot");
+            let performed = perform_unobserved(&performance(), &mut driver).expect("a stage with a robot");
             assert!(performed.cycles.iter().any(|cycle| cycle.touched));
             black_box(performed)
         });

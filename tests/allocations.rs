@@ -1,11 +1,12 @@
-//! What is promised to allocate nothing allocates nothing.
+//! What is promised to allocate nothing allocates nothing. (On several threads: `memory.rs`.)
 
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::engine::{Engine, InstructionSet};
 use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions};
 use scrnn::initialization::initialize;
-use scrnn::learning::{Adam, Control, EpochReport, Lbfgs, Learner, Momentum, Optimiser, Plan};
+use scrnn::learning::{Adam, EpochReport, Lbfgs, Learner, Momentum, Optimiser, Plan, PriorStep};
 use scrnn::topology::{Group, Prediction, Topology};
+use std::ops::ControlFlow;
 
 fn wave(steps: usize) -> Vec<f64> {
     (0..2 * steps).map(|k| 0.6 * (0.3 * k as f64).sin()).collect()
@@ -17,8 +18,11 @@ fn a_control_step_of_error_regression_allocates_nothing() {
     let topology = Topology::new(2, 3, groups, Prediction::MeanAndVariance { floor: 0.0 }).unwrap();
     let (network, states) = initialize(&topology, 1, 1);
     for set in InstructionSet::available() {
-        let options = ErrorRegressionOptions { window: 9, ..ErrorRegressionOptions::new(2) };
-        let mut regression = ErrorRegression::new(&network, states.sequence(0), options, set).unwrap();
+        let options = ErrorRegressionOptions::with(2, |it| {
+            it.window = 9;
+        });
+        let mut regression =
+            ErrorRegression::new(&network, states.sequence(0), options, &Engine::new(1, set).unwrap()).unwrap();
         let samples = wave(40);
         let counted = allocation_counter::measure(|| {
             for sample in samples.chunks(2) {
@@ -34,30 +38,47 @@ fn after_the_first_epochs_an_epoch_allocates_nothing() {
     let sequences = [30, 45, 12].map(|steps| Sequence::new("", 2, wave(steps)).unwrap());
     let data = Dataset::new(Dataset::numbered_channels(2), sequences.to_vec()).unwrap();
     let topology = Topology::s_ctrnn(2, 13, 2.0).unwrap();
-    let in_batches = Optimiser::Adam(Adam { batch_size: 2, ..Adam::default() });
+    let in_batches = Optimiser::Adam(Adam::with(|it| {
+        it.batch_size = 2;
+    }));
     let momentum = || Optimiser::Momentum(Momentum::default());
     for (recompute, optimiser, share) in [
         (false, momentum(), 0.0),
         (true, momentum(), 0.0),
+        (
+            false,
+            Optimiser::Momentum(Momentum::with(|it| {
+                it.prior = PriorStep::Thesis;
+            })),
+            0.0,
+        ),
         (false, in_batches.clone(), 0.0),
         // L-BFGS from the start, and from the tenth of twenty epochs on.
         (false, momentum(), 1.0),
         (false, in_batches, 0.5),
     ] {
         let (network, states) = initialize(&topology, 3, 1);
-        let lbfgs = (share > 0.0).then_some(Lbfgs { share, memory: 4 });
-        let plan = Plan { epochs: 20, recompute, optimiser: optimiser.clone(), lbfgs, ..Plan::default() };
+        let lbfgs = (share > 0.0).then_some(Lbfgs::with(|it| {
+            it.share = share;
+            it.memory = 4;
+        }));
+        let plan = Plan::with(|it| {
+            it.epochs = 20;
+            it.recompute = recompute;
+            it.optimiser = optimiser.clone();
+            it.lbfgs = lbfgs;
+        });
         let mut learner = Learner::new(network, states, &data, plan, &Engine::serial()).unwrap();
         // Counting begins and ends inside of the training, where the observer stands.
         let mut epochs = 0;
-        learner.run(&mut |_: &EpochReport, _: &Learner| {
+        let _ = learner.run(&mut |_: &EpochReport, _: &Learner| {
             epochs += 1;
-            if epochs < 3 { Control::Continue } else { Control::Stop }
+            if epochs < 3 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
         let counted = allocation_counter::measure(|| {
-            learner.run(&mut |_: &EpochReport, _: &Learner| {
+            let _ = learner.run(&mut |_: &EpochReport, _: &Learner| {
                 epochs += 1;
-                if epochs < 15 { Control::Continue } else { Control::Stop }
+                if epochs < 15 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
             });
         });
         assert_eq!((epochs, counted.count_total), (15, 0), "{optimiser:?}, recompute {recompute}, L-BFGS {share}");

@@ -1,5 +1,7 @@
 //! The program from outside: each command on small data, its errors, its exit codes, and runs that are killed.
 
+#[path = "cli/channels.rs"]
+mod channels;
 #[path = "cli/experiments.rs"]
 mod experiments;
 #[path = "cli/extremes.rs"]

@@ -1,13 +1,14 @@
 //! Learning as the thesis prescribes it: the rules of ascent step by step, and the shipped experiments on the sine wave.
 
 use std::f64::consts::TAU;
+use std::ops::ControlFlow;
 
 use assert_cmd::Command;
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::engine::Engine;
 use scrnn::initial_states::InitialStates;
 use scrnn::initialization::initialize;
-use scrnn::learning::{AdaptiveRate, Control, EpochReport, Learner, Momentum, Optimiser, Plan};
+use scrnn::learning::{AdaptiveRate, EpochReport, Learner, Momentum, Optimiser, Plan};
 use scrnn::topology::Topology;
 use serde_json::Value;
 
@@ -26,7 +27,10 @@ fn data() -> Dataset {
 }
 
 fn plan(epochs: u64, options: Momentum) -> Plan {
-    Plan { epochs, optimiser: Optimiser::Momentum(options), ..Plan::default() }
+    Plan::with(|it| {
+        it.epochs = epochs;
+        it.optimiser = Optimiser::Momentum(options);
+    })
 }
 
 fn learner(plan: Plan) -> Learner {
@@ -37,24 +41,33 @@ fn learner(plan: Plan) -> Learner {
 /// Learns to the end; all reports.
 fn run(learner: &mut Learner) -> Vec<EpochReport> {
     let mut reports = Vec::new();
-    learner.run(&mut |report: &EpochReport, _: &Learner| {
+    let _ = learner.run(&mut |report: &EpochReport, _: &Learner| {
         reports.push(report.clone());
-        Control::Continue
+        ControlFlow::Continue(())
     });
     reports
 }
 
 #[test]
 fn rates_are_divided_by_steps_and_channels() {
-    let report = run(&mut learner(plan(0, Momentum { rate: 0.5, ..Momentum::default() })))[0].clone();
+    let report = run(&mut learner(plan(
+        0,
+        Momentum::with(|it| {
+            it.rate = 0.5;
+        }),
+    )))[0]
+        .clone();
     // 29 and 19 steps, two channels.
     assert_eq!((report.rate_shared, report.rate_initial), (0.5 / (48.0 * 2.0), 0.5 / 2.0));
 }
 
 #[test]
 fn each_step_adds_eta_times_the_last_one() {
-    let options = Momentum { rate: 0.01, momentum: 0.6, ..Momentum::default() };
-    let weights = |learner: &Learner| learner.network().parameters.as_slice().to_vec();
+    let options = Momentum::with(|it| {
+        it.rate = 0.01;
+        it.momentum = 0.6;
+    });
+    let weights = |learner: &Learner| learner.network().parameters().as_slice().to_vec();
     let mut two = learner(plan(2, options.clone()));
     let before = weights(&two);
     run(&mut two);
@@ -76,8 +89,13 @@ fn each_step_adds_eta_times_the_last_one() {
 
 #[test]
 fn the_adaptive_rate_withdraws_steps_that_let_the_error_grow() {
-    let adaptive = AdaptiveRate { max_error_ratio: 1.02, ..AdaptiveRate::default() };
-    let options = Momentum { rate: 0.3, adaptive: Some(adaptive), ..Momentum::default() };
+    let adaptive = AdaptiveRate::with(|it| {
+        it.max_error_ratio = 1.02;
+    });
+    let options = Momentum::with(|it| {
+        it.rate = 0.3;
+        it.adaptive_rate = Some(adaptive);
+    });
     let reports = run(&mut learner(plan(300, options)));
     let (mut raised, mut lowered) = (0, 0);
     for pair in reports.windows(2) {

@@ -9,12 +9,13 @@ use scrnn::error_regression::{Ascent, ErrorRegression, ErrorRegressionOptions};
 use scrnn::generation::{Feedback, Running};
 use scrnn::initial_states::InitialStates;
 use scrnn::initialization::initialize;
-use scrnn::learning::{Adam, Control, EpochReport, Learner, Optimiser, Outcome, Plan};
+use scrnn::learning::{Adam, EpochReport, Learner, Optimiser, Outcome, Plan};
 use scrnn::network::Network;
 use scrnn::parameters::Block;
 use scrnn::recognition::{RecognitionOptions, recognize};
 use scrnn::scaling::Scaling;
 use scrnn::topology::{Group, Prediction, Topology};
+use std::ops::ControlFlow;
 
 const UNITS: usize = 5;
 
@@ -49,7 +50,7 @@ fn data_that_do_not_fit_together_are_refused() {
     assert!(!flat.is_empty() && Sequence::new("none", 1, vec![]).unwrap().is_empty());
     refused(Dataset::new(vec!["a".into(), "b".into()], vec![flat.clone()]), &["sequence 0", "1", "2"]);
     let narrow = Dataset::new(vec!["a".into()], vec![flat]).unwrap();
-    refused(narrow.check_for(&network().0.topology), &["data set", "1", "2"]);
+    refused(narrow.check_for(network().0.topology()), &["data set", "1", "2"]);
 }
 
 #[test]
@@ -74,10 +75,14 @@ fn instructions_that_the_processor_does_not_have_are_refused_with_those_that_it_
 fn learning_and_recognising_ask_for_what_belongs_to_them() {
     let engine = Engine::new(1, InstructionSet::Portable).unwrap();
     let (network, states) = network();
-    let one = InitialStates::zeros(&network.topology, 1);
-    let plan = Plan { epochs: 10, ..Plan::default() };
+    let one = InitialStates::zeros(network.topology(), 1);
+    let plan = Plan::with(|it| {
+        it.epochs = 10;
+    });
     refused(Learner::new(network.clone(), one, &waves(), plan, &engine), &["initial states", "1", "2"]);
-    let options = RecognitionOptions { warm_starts: vec![], ..RecognitionOptions::default() };
+    let options = RecognitionOptions::with(|it| {
+        it.warm_starts = vec![];
+    });
     refused(recognize(&network, &states, &waves(), &options, &engine), &["empty", "at least one kind"]);
 }
 
@@ -86,8 +91,12 @@ fn a_recognition_whose_steps_leave_the_numbers_keeps_the_best_start() {
     let engine = Engine::new(1, InstructionSet::Portable).unwrap();
     let (mut network, states) = network();
     // A variance that follows the context without bounds: far out it overflows.
-    network.parameters.block_mut(Block::VarianceFromContext).fill(300.0);
-    let options = RecognitionOptions { starts: 4, epochs: 20, rate: 1e3, ..RecognitionOptions::default() };
+    network.block_mut(Block::VarianceFromContext).fill(300.0);
+    let options = RecognitionOptions::with(|it| {
+        it.starts = 4;
+        it.epochs = 20;
+        it.rate = 1e3;
+    });
     for found in recognize(&network, &states, &waves(), &options, &engine).unwrap() {
         for trial in &found.trials {
             assert!(trial.ln_likelihood.is_finite() || trial.ln_likelihood == f64::NEG_INFINITY, "{trial:?}");
@@ -101,13 +110,16 @@ fn a_gradient_beyond_all_numbers_is_a_divergence_that_names_its_block() {
     let engine = Engine::new(1, InstructionSet::Portable).unwrap();
     let (mut network, states) = network();
     // v = 1e-308 and errors near 0.05: the sum of e^2 / 2v is a number, that of e / v is none.
-    network.parameters.as_mut_slice().fill(0.0);
-    network.parameters.block_mut(Block::VarianceBias).fill(-709.0);
+    network.parameters_mut().fill(0.0);
+    network.block_mut(Block::VarianceBias).fill(-709.0);
     let near = |name: &str| Sequence::new(name, 2, (0..120).map(|k| 0.05 + 1e-4 * f64::from(k % 7)).collect()).unwrap();
     let data = Dataset::new(vec!["a".into(), "b".into()], vec![near("one"), near("two")]).unwrap();
-    let plan = Plan { epochs: 3, optimiser: Optimiser::Adam(Adam::default()), ..Plan::default() };
+    let plan = Plan::with(|it| {
+        it.epochs = 3;
+        it.optimiser = Optimiser::Adam(Adam::default());
+    });
     let mut learner = Learner::new(network, states, &data, plan, &engine).unwrap();
-    let ended = learner.run(&mut |_: &EpochReport, _: &Learner| Control::Continue);
+    let ended = learner.run(&mut |_: &EpochReport, _: &Learner| ControlFlow::Continue(()));
     let Outcome::Diverged(divergence) = ended else { panic!("did not diverge") };
     let told = divergence.to_string();
     assert!(told.contains("diverged at epoch 0") && told.contains("gradient of "), "{told}");
@@ -119,7 +131,7 @@ fn error_regression_refuses_what_it_cannot_use() {
     let new = |state: &[f64], change: &dyn Fn(&mut ErrorRegressionOptions)| {
         let mut options = ErrorRegressionOptions::new(2);
         change(&mut options);
-        ErrorRegression::new(&network, state, options, InstructionSet::Portable)
+        ErrorRegression::new(&network, state, options, &Engine::new(1, InstructionSet::Portable).unwrap())
     };
     refused(new(&[0.0; 4], &|_| ()), &["initial state", "4", "5"]);
     refused(
@@ -134,9 +146,15 @@ fn a_shortened_gradient_moves_the_state_less() {
     let (network, _) = network();
     let moved = |max_norm| {
         let ascent = Ascent::Momentum { rate: 1e-2, momentum: 0.0 };
-        let options =
-            ErrorRegressionOptions { window: 10, iterations: 1, ascent, max_norm, ..ErrorRegressionOptions::new(2) };
-        let mut regression = ErrorRegression::new(&network, &[0.1; UNITS], options, InstructionSet::Portable).unwrap();
+        let options = ErrorRegressionOptions::with(2, |it| {
+            it.window = 10;
+            it.iterations = 1;
+            it.ascent = ascent;
+            it.max_norm = max_norm;
+        });
+        let mut regression =
+            ErrorRegression::new(&network, &[0.1; UNITS], options, &Engine::new(1, InstructionSet::Portable).unwrap())
+                .unwrap();
         let mut gain = 0.0;
         for k in 0..30 {
             let sample = [0.9 * (0.7 * f64::from(k)).sin(), -0.8];
@@ -155,7 +173,8 @@ fn a_network_without_variance_runs_beside_a_world_and_can_change_its_feedback() 
     let (network, _) = initialize(&topology(Prediction::Mean), 1, 3);
     let run = |change: bool| {
         let set = InstructionSet::Portable;
-        let mut running = Running::new(&network, &[0.2; UNITS], Feedback::open(2), 1, set).unwrap();
+        let mut running =
+            Running::new(&network, &[0.2; UNITS], Feedback::open(2), 1, &Engine::new(1, set).unwrap()).unwrap();
         for k in 0..20 {
             if change && k == 10 {
                 running.set_feedback(Feedback::closed(2, false)).unwrap();

@@ -192,11 +192,12 @@ fn tests(sources: &[Text]) -> BTreeSet<&str> {
 }
 
 /// Whether `name`, e.g. `kernels::panels::multiply` or `forward::Plain::step`, is defined in the file of its module.
-/// A name that begins with `cli::` is the program's.
+/// A name that begins with that of a folder of crates/, e.g. `tasks::`, is of that crate.
 fn is_defined(name: &str, sources: &[Text]) -> bool {
-    let (folder, name) = match name.strip_prefix("cli::") {
-        Some(name) => ("crates/cli/src", name),
-        None => ("crates/scrnn/src", name),
+    let elsewhere = ["cli", "data", "pages", "report", "reproduce", "run", "sim", "tasks"];
+    let (folder, name) = match name.split_once("::") {
+        Some((place, name)) if elsewhere.contains(&place) => (format!("crates/{place}/src"), name),
+        _ => ("crates/scrnn/src".to_owned(), name),
     };
     let mut parts: Vec<&str> = name.split("::").collect();
     let function = parts.pop().unwrap_or_default();
@@ -306,6 +307,21 @@ fn one_file_of_the_library_names_rayon() {
     let names = |source: &&Text| source.path.starts_with("crates/scrnn/src/") && source.text.contains("rayon::");
     let files: Vec<&str> = sources.iter().filter(names).map(|source| source.path.as_str()).collect();
     assert_eq!(files, ["crates/scrnn/src/engine.rs"]);
+}
+
+/// Crates whose random numbers all come from `scrnn::streams`. What stands in a file's tests may draw as it likes.
+const FROM_STREAMS: [&str; 2] = ["crates/scrnn/src/", "crates/tasks/src/"];
+
+#[test]
+fn one_file_makes_generators_of_random_numbers() {
+    let makes = |source: &&Text| {
+        let code = source.text.split("#[cfg(test)]").next().unwrap_or_default();
+        let own = FROM_STREAMS.iter().any(|folder| source.path.starts_with(folder)) && !source.is_test();
+        own && ["seed_from_u64(", "from_seed(", "set_stream(", "from_rng("].iter().any(|call| code.contains(call))
+    };
+    let sources = sources();
+    let files: Vec<&str> = sources.iter().filter(makes).map(|source| source.path.as_str()).collect();
+    assert_eq!(files, ["crates/scrnn/src/streams.rs"]);
 }
 
 #[test]

@@ -48,7 +48,7 @@ impl Gradient {
 impl Epoch {
     /// Takes over a network of delay 1 and sequences of one length.
     pub fn new(network: &Network, states: &InitialStates, data: &Dataset) -> Self {
-        let (topology, parameters) = (&network.topology, &network.parameters);
+        let (topology, parameters) = (network.topology(), network.parameters());
         let (units, channels, outputs) = (topology.context_units(), topology.channels(), topology.output_units());
         let sequences = data.sequences().len();
         let samples = data.sequences()[0].len();

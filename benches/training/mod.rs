@@ -1,11 +1,12 @@
 //! Networks in training at given sizes, and the time that their epochs take.
 
+use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::engine::{Engine, InstructionSet};
 use scrnn::initialization::initialize;
-use scrnn::learning::{Adam, Control, EpochReport, Learner, Optimiser, Plan};
+use scrnn::learning::{Adam, EpochReport, Learner, Optimiser, Plan};
 use scrnn::topology::Topology;
 
 /// Smooth sequences that give `steps` steps of prediction each, between -0.8 and 0.8, no two alike.
@@ -31,7 +32,10 @@ impl Training {
     /// A new network on `data`, with Adam on a schedule so long that its rate stays near 0: all epochs cost the same.
     pub fn new(topology: &Topology, data: &Dataset, threads: usize, set: InstructionSet) -> Self {
         let (network, states) = initialize(topology, data.sequences().len(), 1);
-        let plan = Plan { epochs: 1 << 50, optimiser: Optimiser::Adam(Adam::default()), ..Plan::default() };
+        let plan = Plan::with(|it| {
+            it.epochs = 1 << 50;
+            it.optimiser = Optimiser::Adam(Adam::default());
+        });
         let engine = Engine::new(threads, set).expect("an instruction set that this processor has");
         let learner = Learner::new(network, states, data, plan, &engine).expect("data made for the network");
         Self { learner }
@@ -41,15 +45,15 @@ impl Training {
     /// the last is left out.
     pub fn time(&mut self, epochs: u64) -> Duration {
         let (mut seen, mut start, mut elapsed) = (0, Instant::now(), Duration::ZERO);
-        self.learner.run(&mut |_: &EpochReport, _: &Learner| {
+        let _ = self.learner.run(&mut |_: &EpochReport, _: &Learner| {
             if seen == 0 {
                 start = Instant::now();
             } else if seen == epochs {
                 elapsed = start.elapsed();
-                return Control::Stop;
+                return ControlFlow::Break(());
             }
             seen += 1;
-            Control::Continue
+            ControlFlow::Continue(())
         });
         assert!(seen == epochs, "the training ended after {seen} of {epochs} epochs");
         elapsed

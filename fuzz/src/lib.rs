@@ -3,7 +3,7 @@
 //! Each function takes the bytes of a file. It must come back, whatever they are, must not panic, and must not hold much
 //! more memory than the file has bytes: [`bounded`] counts.
 
-use scrnn_program::readers;
+mod readers;
 
 /// What a reader may hold whatever the file.
 const FREE: u64 = 1 << 20;

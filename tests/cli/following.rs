@@ -26,20 +26,20 @@ fn a_recorded_sequence_is_followed_sample_by_sample() {
     assert!(gained > 40, "{gained} of 59");
     // Before xi samples there is no window; later it is as long as asked for, and so is the future.
     let first = &steps[0]["view"];
-    assert_eq!((numbers(&first["postdicted"]).len(), numbers(&first["predicted"]).len()), (0, 4));
+    assert_eq!((numbers(&first["smoothed"]).len(), numbers(&first["predicted"]).len()), (0, 4));
     let view = &steps[29]["view"];
-    assert_eq!((view["from"].as_u64(), numbers(&view["postdicted"]).len()), (Some(23), 8));
+    assert_eq!((view["from"].as_u64(), numbers(&view["smoothed"]).len()), (Some(23), 8));
     assert_eq!((numbers(&view["predicted"]).len(), numbers(&view["variance"]).len()), (4, 4));
     assert_eq!(numbers(&view["contexts"]).len(), 8 * 6);
     assert!(steps[10].get("view").is_none());
     let latency = &sequence["latency"];
     assert!(latency["median"].as_f64() <= latency["p99"].as_f64() && latency["missed"].is_null(), "{latency}");
 
-    // The file has each sample as it was predicted and as it was postdicted.
+    // The file has each sample as it was predicted and as it was smoothed.
     let table = place.ok("recognize run new.csv --online --window 8 --steps 5 --out followed.csv");
     assert!(table.starts_with("sequence  samples  ln L in the window"), "{table}");
     let text = place.text("followed.csv");
-    assert!(text.starts_with("sequence,step,mean_y,variance_y,postdicted_y,context_context1"), "{text}");
+    assert!(text.starts_with("sequence,step,mean_y,variance_y,smoothed_y,context_context1"), "{text}");
     assert_eq!(text.lines().count(), 60);
     let again: Value = place.json(line);
     let without_times = |value: &Value| numbers(&value["sequences"][0]["steps"][29]["view"]["predicted"]);

@@ -44,12 +44,11 @@ fn check_figures(place: &Place, folder: &str) -> Vec<String> {
 
 /// The metrics without what a clock says.
 fn without_times(mut metrics: Value) -> Value {
-    for key in ["seconds", "machine", "command"] {
-        metrics.as_object_mut().unwrap().remove(key);
+    for key in ["seconds", "machine", "command", "times"] {
+        metrics.as_object_mut().unwrap().remove(key).unwrap();
     }
-    metrics["verdicts"].as_array_mut().unwrap().retain(|verdict| verdict["goal"] != "time of a seed");
     for seed in metrics["seeds"].as_array_mut().unwrap() {
-        for key in ["seconds", "threads"] {
+        for key in ["seconds", "seconds_of_evaluation", "threads"] {
             seed.as_object_mut().unwrap().remove(key);
         }
         for training in seed["trainings"].as_array_mut().unwrap() {
@@ -123,6 +122,36 @@ fn an_interrupted_reproduction_leaves_no_page_and_goes_on() {
     assert_eq!(without_times(metrics(&place, "cut")), without_times(metrics(&place, "whole")));
 }
 
+/// The most threads that a command had at a time.
+#[cfg(target_os = "linux")]
+fn most_threads(place: &Place, line: &str) -> usize {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_scrnn"));
+    let silent =
+        command.current_dir(&place.0).args(line.split_whitespace()).stdout(Stdio::null()).stderr(Stdio::null());
+    let mut child = silent.spawn().unwrap();
+    let tasks = format!("/proc/{}/task", child.id());
+    let mut most = 0;
+    while child.try_wait().unwrap().is_none() {
+        most = most.max(std::fs::read_dir(&tasks).map_or(0, Iterator::count));
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    assert!(child.wait().unwrap().success(), "{line}");
+    most
+}
+
+/// One waits for Ctrl-C.
+#[cfg(target_os = "linux")]
+#[test]
+fn one_thread_means_one_for_seeds_and_worlds_alike() {
+    let place = Place::new();
+    for line in ["reproduce sinusoid --epochs 600 --seeds 3", "data reach --sequences 4 --steps 24"] {
+        let most =
+            |threads: usize| most_threads(&place, &format!("{line} --threads {threads} --out with-{threads}.csv"));
+        let (one, two) = (most(1), most(2));
+        assert!((1..=2).contains(&one) && two == one + 1, "{line}: {one} and {two} threads");
+    }
+}
+
 #[test]
 fn other_settings_need_another_folder_or_permission_to_overwrite() {
     let place = Place::new();
@@ -175,7 +204,19 @@ fn the_oscillator_is_judged_on_sequences_that_were_not_learned() {
     let oscillator = &found["seeds"][0]["findings"]["oscillator"];
     assert!((oscillator["period"].as_f64().unwrap() - 75.5).abs() < 2.0, "{oscillator}");
     assert!(oscillator["cycles"].as_u64().unwrap() > 39_000);
-    assert_eq!(found["verdicts"].as_array().unwrap().len(), 3);
+    // Times are reported beside the goals, and none asks for them.
+    let goals: Vec<&str> =
+        found["verdicts"].as_array().unwrap().iter().map(|one| one["goal"].as_str().unwrap()).collect();
+    assert_eq!((goals.len(), goals.iter().any(|goal| goal.contains("time"))), (2, false));
+    assert_eq!(found["times"][1]["key"], "evaluation");
+    assert!(found["times"][1]["mean"].as_f64().unwrap() > 0.0);
+
+    // What was evaluated is not evaluated again.
+    let kept = place.text("cycle/seed-1/evaluation.toml");
+    assert!(kept.contains("swings of the oscillator"), "{kept}");
+    let again = place.json("reproduce limit-cycle --epochs 20 --out cycle --json");
+    assert_eq!(place.text("cycle/seed-1/evaluation.toml"), kept);
+    assert_eq!(without_times(again), without_times(found));
 }
 
 #[test]

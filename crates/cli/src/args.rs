@@ -1,58 +1,17 @@
-//! The command line: its commands, and the options that all of them share.
+//! The options that commands share.
 
 use std::path::Path;
-use std::sync::LazyLock;
 
-use clap::{Args, Parser, Subcommand};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use scrnn::engine::{Engine, InstructionSet};
-
-use crate::command::{completions, data, generate, inspect, recognize, report, reproduce, simulate, train};
-use crate::failure::Result;
 use scrnn_data::Selection;
-
-static VERSION: LazyLock<String> =
-    LazyLock::new(|| format!("{} (instruction set {})", env!("CARGO_PKG_VERSION"), InstructionSet::best()));
+use scrnn_run::failure::Result;
+use scrnn_run::messages::Messages;
+use scrnn_tasks::TaskName;
 
 /// Where the options of every command stand in the help.
 const SHARED: &str = "Options of every command";
-
-const AFTER_HELP: &str = "\
-A first session, on the thesis' noisy sine wave:
-  scrnn train assets/experiments/sinusoid_fast.toml     learns it, into runs/sinusoid_fast
-  scrnn generate runs/sinusoid_fast --out wave.csv      lets the network run on its own
-  scrnn inspect runs/sinusoid_fast                      what is in the run folder
-
-The thesis' chapter 3, with a page to look at:
-  scrnn reproduce sinusoid                              trains, evaluates, compares with the thesis
-
-And on data of your own:
-  scrnn inspect mine.csv                                what scrnn makes of the file
-  scrnn train mine.toml                                 an experiment with files = [\"mine.csv\"]
-  scrnn recognize runs/mine new.csv                     which learned sequence is this?
-  scrnn report runs/mine                                the run as a page
-
-Results go to stdout, progress and messages to stderr. Sequences count from 1, as in the thesis.
-
-Exit codes:
-  0    success
-  2    bad usage or bad input: arguments, experiment, data
-  3    the training diverged; it was rolled back, and the last good state is saved
-  4    a file could not be read or written
-  5    refused: the run folder is busy or holds a run, or experiment or data changed
-  130  interrupted by Ctrl-C; the state is saved";
-
-/// Recurrent networks that learn to predict sequences together with their own uncertainty
-///
-/// scrnn trains S-CTRNNs and S-MTRNNs: continuous-time recurrent networks that predict the mean and the variance of the
-/// next sample. A trained network generates sequences with the fluctuations it has seen, and recognises new ones.
-#[derive(Debug, Parser)]
-#[command(name = "scrnn", version = VERSION.as_str(), after_help = AFTER_HELP, max_term_width = 100)]
-pub struct Cli {
-    #[command(flatten)]
-    pub shared: Shared,
-    #[command(subcommand)]
-    pub command: Command,
-}
 
 /// Options of every command.
 #[derive(Debug, Args)]
@@ -84,6 +43,12 @@ impl Shared {
         if !self.quiet {
             eprintln!("{message}");
         }
+    }
+}
+
+impl Messages for Shared {
+    fn say(&self, message: &str) {
+        Shared::say(self, message);
     }
 }
 
@@ -124,22 +89,8 @@ impl Part {
     }
 }
 
-/// What to do.
-#[derive(Debug, Subcommand)]
-pub enum Command {
-    Data(data::Arguments),
-    Train(train::Arguments),
-    Generate(generate::Arguments),
-    Recognize(recognize::Arguments),
-    Simulate(simulate::Arguments),
-    Reproduce(reproduce::Arguments),
-    Report(report::Arguments),
-    Inspect(inspect::Arguments),
-    /// Print the JSON schema of the experiment file
-    ///
-    /// Editors with a TOML language server complete and check an experiment file that begins with
-    ///   #:schema ./scrnn.schema.json
-    #[command(verbatim_doc_comment, after_help = "Example:\n  scrnn schema > scrnn.schema.json")]
-    Schema,
-    Completions(completions::Arguments),
+/// A parser for the names of tasks, which also tells the shell and the help what there is.
+pub fn task_names() -> impl TypedValueParser<Value = TaskName> {
+    let name = |name: TaskName| PossibleValue::new(name.word()).help(name.about());
+    PossibleValuesParser::new(TaskName::ALL.map(name)).try_map(|word| word.parse::<TaskName>())
 }

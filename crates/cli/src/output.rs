@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use crate::failure::{Failure, Result};
+use scrnn_run::failure::{Failure, Result};
 
 /// Prints a text as it is.
 pub fn print(text: &str) -> Result<()> {

@@ -5,15 +5,36 @@ use std::time::{Duration, Instant};
 
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use scrnn::learning::EpochReport;
+use scrnn_report::in_words;
+use scrnn_run::messages;
 
 /// Between two lines off a terminal.
 const BETWEEN_LINES: Duration = Duration::from_secs(5);
 /// Between two updates of the bar.
 const BETWEEN_UPDATES: Duration = Duration::from_millis(100);
 
+/// Trainings that go on side by side, each with a bar or lines of its own.
+#[derive(Debug)]
+pub struct Bars {
+    all: MultiProgress,
+    quiet: bool,
+}
+
+impl Bars {
+    /// None yet.
+    pub fn new(quiet: bool) -> Self {
+        Self { all: MultiProgress::new(), quiet }
+    }
+
+    /// For a training of `total` epochs; `label` goes before what is shown of it.
+    pub fn bar(&self, label: &str, total: u64) -> Box<dyn messages::Progress> {
+        Box::new(Progress::labelled(label, total, self.quiet, &self.all))
+    }
+}
+
 /// Shows the epochs as they pass.
 #[derive(Debug)]
-pub struct Progress {
+struct Progress {
     label: String,
     display: Display,
     total: u64,
@@ -29,13 +50,7 @@ enum Display {
 }
 
 impl Progress {
-    /// For a training of `total` epochs.
-    pub fn new(total: u64, quiet: bool) -> Self {
-        Self::labelled("", total, quiet, &MultiProgress::new())
-    }
-
-    /// For one of several trainings that go on side by side; `label` goes before what is shown of it.
-    pub fn labelled(label: &str, total: u64, quiet: bool, all: &MultiProgress) -> Self {
+    fn labelled(label: &str, total: u64, quiet: bool, all: &MultiProgress) -> Self {
         let display = if quiet {
             Display::Quiet
         } else if std::io::stderr().is_terminal() {
@@ -47,9 +62,11 @@ impl Progress {
         };
         Self { label: label.to_owned(), display, total, start: None, shown: Instant::now() }
     }
+}
 
+impl messages::Progress for Progress {
     /// Shows where training stands, if it is time to.
-    pub fn epoch(&mut self, report: &EpochReport) {
+    fn epoch(&mut self, report: &EpochReport) {
         let now = Instant::now();
         let (first, begun) = *self.start.get_or_insert((report.epoch, now));
         let pause = match self.display {
@@ -82,7 +99,7 @@ impl Progress {
     }
 
     /// Says something that stays.
-    pub fn say(&self, message: &str) {
+    fn say(&self, message: &str) {
         match &self.display {
             Display::Quiet => {}
             Display::Lines => eprintln!("{}{message}", self.label),
@@ -91,7 +108,7 @@ impl Progress {
     }
 
     /// Leaves the terminal in order.
-    pub fn finish(&self) {
+    fn finish(&self) {
         if let Display::Bar(bar) = &self.display {
             bar.abandon();
         }
@@ -101,25 +118,4 @@ impl Progress {
 /// Three digits are enough for a speed.
 fn rounded(speed: f64) -> String {
     if speed < 100.0 { format!("{speed:.1}") } else { format!("{speed:.0}") }
-}
-
-/// A duration as people say it.
-pub fn in_words(duration: Duration) -> String {
-    let seconds = duration.as_secs_f64().round().min(9e15) as u64;
-    match seconds {
-        0..60 => format!("{seconds} s"),
-        60..3600 => format!("{} min {:02} s", seconds / 60, seconds % 60),
-        _ => format!("{} h {:02} min", seconds / 3600, seconds % 3600 / 60),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn durations_read_as_people_say_them() {
-        let words = [0.4, 59.0, 75.0, 3723.0].map(|seconds| in_words(Duration::from_secs_f64(seconds)));
-        assert_eq!(words, ["0 s", "59 s", "1 min 15 s", "1 h 02 min"]);
-    }
 }

@@ -15,7 +15,7 @@ use pulp::Simd;
 
 use crate::batch::Block;
 use crate::kernels::copy_few;
-use crate::kernels::outer::{Rows, accumulate};
+use crate::kernels::outer::{Rows, Taken, accumulate};
 use crate::kernels::panels::{Columns, Product, multiply};
 use crate::packed::Packed;
 use crate::trajectory::Trajectory;
@@ -93,7 +93,8 @@ pub(crate) fn run<S: Simd>(
     }
 }
 
-/// Adds the outer products of a segment to the gradient of [`Packed::gradient_len`] values.
+/// Adds the outer products of a segment to the gradient of [`Packed::gradient_len`] values: between two ends of columns all
+/// steps at once.
 #[inline(always)]
 pub(crate) fn gather<S: Simd>(
     simd: S,
@@ -106,20 +107,17 @@ pub(crate) fn gather<S: Simd>(
 ) {
     let n = block.columns();
     let (context, input) = gradient.split_at_mut(packed.gradient_split());
-    let mut add = |from: usize, count: usize| {
-        let deltas = &trajectory.deltas[(from - range.start + 1) * n * packed.delta_stride..];
-        let states = &trajectory.states[(from - span_start) * n * packed.state_stride..];
+    for (part, active) in block.stretches(range.clone()) {
+        let taken = match active == n {
+            true => Taken::from(part.len() * n),
+            false => Taken { groups: part.len(), width: active, period: n },
+        };
+        let deltas = &trajectory.deltas[(part.start - range.start + 1) * n * packed.delta_stride..];
+        let states = &trajectory.states[(part.start - span_start) * n * packed.state_stride..];
         let deltas = Rows { values: deltas, stride: packed.delta_stride };
         let states = Rows { values: states, stride: packed.state_stride };
-        accumulate(simd, deltas, states, count, packed.rows, (0, packed.n_c), context);
+        accumulate(simd, deltas, states, taken, packed.rows, (0, packed.n_c), context);
         let inputs = (packed.rows, packed.rows + packed.n_x + 1);
-        accumulate(simd, deltas, states, count, packed.rows, inputs, input);
-    };
-    if block.active(range.end - 1) == n {
-        add(range.start, range.len() * n);
-    } else {
-        for k in range.clone() {
-            add(k, block.active(k));
-        }
+        accumulate(simd, deltas, states, taken, packed.rows, inputs, input);
     }
 }

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 use crate::initial_states::InitialStates;
+pub use crate::learning::{OptimiserState, StateTensor};
 use crate::parameters::{Block, Parameters};
 use crate::scaling::Scaling;
 use crate::topology::{Group, Prediction, Topology};
@@ -51,26 +52,6 @@ pub struct Checkpoint {
     pub optimiser: OptimiserState,
     /// Whatever the caller keeps beside it: the experiment, the data's digest, ...
     pub notes: serde_json::Value,
-}
-
-/// Tensors and numbers of an optimiser, enough to go on bit for bit. Any value is kept, also NaN and infinity.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct OptimiserState {
-    /// Velocities, moments and their like. Names are distinct, and none is `numbers`.
-    pub tensors: Vec<StateTensor>,
-    /// Counters, rates and their like.
-    pub numbers: Vec<(String, f64)>,
-}
-
-/// One tensor of an optimiser.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct StateTensor {
-    /// Its name, to which the file adds `optimiser.` in front.
-    pub name: String,
-    /// Its shape.
-    pub shape: Vec<usize>,
-    /// Its values, row-major.
-    pub values: Vec<f64>,
 }
 
 impl Checkpoint {
@@ -365,7 +346,7 @@ struct TopologyRecord {
     delay: usize,
     prediction: PredictionRecord,
     variance_floor: f64,
-    groups: Vec<GroupRecord>,
+    groups: Vec<Group>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -373,17 +354,6 @@ struct TopologyRecord {
 enum PredictionRecord {
     Mean,
     MeanAndVariance,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct GroupRecord {
-    name: String,
-    units: usize,
-    time_constant: f64,
-    receives_input: bool,
-    drives_output: bool,
-    learns_initial_state: bool,
 }
 
 /// Names only, in the optimiser's order. The values are tensors, as JSON knows neither NaN nor infinity.
@@ -396,14 +366,6 @@ struct OptimiserRecord {
 
 impl Record {
     fn of(checkpoint: &Checkpoint) -> Self {
-        let group = |group: &Group| GroupRecord {
-            name: group.name.clone(),
-            units: group.units,
-            time_constant: group.time_constant,
-            receives_input: group.receives_input,
-            drives_output: group.drives_output,
-            learns_initial_state: group.learns_initial_state,
-        };
         Self {
             format_version: FORMAT_VERSION,
             epoch: checkpoint.epoch,
@@ -416,7 +378,7 @@ impl Record {
                     Prediction::MeanAndVariance { .. } => PredictionRecord::MeanAndVariance,
                 },
                 variance_floor: checkpoint.topology.variance_floor(),
-                groups: checkpoint.topology.groups().iter().map(group).collect(),
+                groups: checkpoint.topology.groups().to_vec(),
             },
             optimiser: OptimiserRecord {
                 tensors: checkpoint.optimiser.tensors.iter().map(|tensor| tensor.name.clone()).collect(),
@@ -451,15 +413,7 @@ impl Record {
             }
             PredictionRecord::MeanAndVariance => Prediction::MeanAndVariance { floor },
         };
-        let group = |group: &GroupRecord| Group {
-            name: group.name.clone(),
-            units: group.units,
-            time_constant: group.time_constant,
-            receives_input: group.receives_input,
-            drives_output: group.drives_output,
-            learns_initial_state: group.learns_initial_state,
-        };
-        let groups = self.topology.groups.iter().map(group).collect();
+        let groups = self.topology.groups.clone();
         Topology::new(self.channels.len(), self.topology.delay, groups, prediction)
             .map_err(|error| refusal(error.to_string()))
     }

@@ -3,16 +3,18 @@
 //! A sequence of L samples gives T = L - xi steps: at step t (from 0) the input is sample t and the target is
 //! sample t + xi.
 
+use std::sync::Arc;
+
 use crate::error::{Error, Result};
 use crate::topology::Topology;
 
-/// One recorded sequence: samples x channels, row-major.
+/// One recorded sequence: samples x channels, row-major. Clones share the samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sequence {
     /// A name to show; may be empty.
     pub name: String,
     channels: usize,
-    values: Vec<f64>,
+    values: Arc<[f64]>,
 }
 
 impl Sequence {
@@ -26,7 +28,7 @@ impl Sequence {
             let needed = values.len().next_multiple_of(channels.max(1));
             return Err(Error::Length { what: format!("sequence `{name}`"), found: values.len(), needed });
         }
-        Ok(Self { name, channels, values })
+        Ok(Self { name, channels, values: values.into() })
     }
 
     /// Number of samples.
@@ -57,11 +59,11 @@ impl Sequence {
     #[must_use]
     pub fn truncated(&self, samples: usize) -> Self {
         let end = samples.min(self.len()) * self.channels;
-        Self { name: self.name.clone(), channels: self.channels, values: self.values[..end].to_vec() }
+        Self { name: self.name.clone(), channels: self.channels, values: self.values[..end].into() }
     }
 }
 
-/// Sequences on the same channels.
+/// Sequences on the same channels. Clones share the samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dataset {
     channels: Vec<String>,
@@ -173,6 +175,13 @@ impl Dataset {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_clone_of_a_data_set_shares_its_samples() {
+        let set =
+            Dataset::new(Dataset::numbered_channels(1), vec![Sequence::new("a", 1, vec![1.0; 9]).unwrap()]).unwrap();
+        assert!(std::ptr::eq(set.clone().sequences()[0].values(), set.sequences()[0].values()));
+    }
 
     #[test]
     fn a_bad_sample_is_named_by_its_place() {

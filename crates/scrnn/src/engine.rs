@@ -5,9 +5,11 @@
 
 use std::fmt;
 use std::str::FromStr;
+#[cfg(feature = "rayon")]
 use std::sync::Arc;
 
 use pulp::{Simd, WithSimd};
+#[cfg(feature = "rayon")]
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
@@ -105,11 +107,12 @@ impl FromStr for InstructionSet {
 #[derive(Debug, Clone)]
 pub struct Engine {
     instruction_set: InstructionSet,
+    #[cfg(feature = "rayon")]
     pool: Option<Arc<rayon::ThreadPool>>,
 }
 
 impl Engine {
-    /// Starts `threads` threads; 0 takes one for each core, 1 starts none.
+    /// Starts `threads` threads; 0 takes one for each core, 1 starts none. Without the feature `rayon` none are started.
     ///
     /// # Errors
     /// [`Error::InstructionSet`] for one that this processor lacks, [`Error::Setting`] if threads cannot be started.
@@ -121,24 +124,49 @@ impl Engine {
             0 => std::thread::available_parallelism().map_or(1, usize::from),
             given => given,
         };
-        let pool = match threads {
-            1 => None,
-            _ => {
-                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-                Some(Arc::new(pool.map_err(|_| Error::Setting {
-                    what: "number of threads",
-                    found: threads.to_string(),
-                    needed: "a number that the system can start",
-                })?))
-            }
-        };
-        Ok(Self { instruction_set, pool })
+        Self::start(threads, instruction_set)
+    }
+
+    #[cfg(feature = "rayon")]
+    fn start(threads: usize, instruction_set: InstructionSet) -> Result<Self> {
+        if threads == 1 {
+            return Ok(Self { instruction_set, pool: None });
+        }
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool = pool.map_err(|_| Error::Setting {
+            what: "number of threads",
+            found: threads.to_string(),
+            needed: "a number that the system can start",
+        })?;
+        Ok(Self { instruction_set, pool: Some(Arc::new(pool)) })
+    }
+
+    /// Without the feature `rayon` there is one thread, whatever is asked for.
+    #[cfg(not(feature = "rayon"))]
+    fn start(_threads: usize, instruction_set: InstructionSet) -> Result<Self> {
+        Ok(Self { instruction_set })
+    }
+
+    /// Works in threads that the caller already has.
+    ///
+    /// # Errors
+    /// [`Error::InstructionSet`] for one that this processor lacks.
+    #[cfg(feature = "rayon")]
+    pub fn with_pool(pool: Arc<rayon::ThreadPool>, instruction_set: InstructionSet) -> Result<Self> {
+        if !instruction_set.is_available() {
+            return Err(InstructionSet::not_available(&instruction_set.to_string()));
+        }
+        Ok(Self { instruction_set, pool: Some(pool) })
     }
 
     /// One thread, the best instruction set.
     #[must_use]
     pub fn serial() -> Self {
-        Self { instruction_set: InstructionSet::best(), pool: None }
+        Self {
+            instruction_set: InstructionSet::best(),
+            #[cfg(feature = "rayon")]
+            pool: None,
+        }
     }
 
     /// The instruction set in use.
@@ -150,15 +178,19 @@ impl Engine {
     /// The number of threads.
     #[must_use]
     pub fn threads(&self) -> usize {
-        self.pool.as_ref().map_or(1, |pool| pool.current_num_threads())
+        #[cfg(feature = "rayon")]
+        return self.pool.as_ref().map_or(1, |pool| pool.current_num_threads());
+        #[cfg(not(feature = "rayon"))]
+        return 1;
     }
 
     /// Calls `work` on every item, on any thread. Each item must carry its own result.
     pub(crate) fn for_each<T: Send>(&self, items: &mut [T], work: impl Fn(&mut T) + Sync + Send) {
-        match &self.pool {
-            Some(pool) if items.len() > 1 => pool.install(|| items.par_iter_mut().with_max_len(1).for_each(work)),
-            _ => items.iter_mut().for_each(work),
+        #[cfg(feature = "rayon")]
+        if let Some(pool) = self.pool.as_ref().filter(|_| items.len() > 1) {
+            return pool.install(|| items.par_iter_mut().with_max_len(1).for_each(work));
         }
+        items.iter_mut().for_each(work);
     }
 }
 
@@ -173,6 +205,17 @@ mod tests {
         }
         let message = "mmx".parse::<InstructionSet>().unwrap_err().to_string();
         assert!(message.contains("mmx") && message.contains("portable"), "{message}");
+    }
+
+    #[cfg(feature = "rayon")]
+    #[test]
+    fn threads_that_the_caller_has_are_taken_as_they_are() {
+        let pool = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap());
+        let engine = Engine::with_pool(Arc::clone(&pool), InstructionSet::best()).unwrap();
+        assert_eq!(engine.threads(), 3);
+        let mut found = vec![None; 50];
+        engine.for_each(&mut found, |index| *index = pool.current_thread_index());
+        assert!(found.iter().all(|index| index.is_some_and(|index| index < 3)), "{found:?}");
     }
 
     #[test]

@@ -9,15 +9,23 @@
 //! without noise, and that state is moved uphill; then the window's past is overwritten with what follows from it, and
 //! so is the prediction of the next sample. Only the groups whose initial state is learned are moved.
 //!
-//! Channels can be left out of ln L_reg, or count in part. The gradient is exact: it also runs through the means that the window feeds back to itself. Inputs of the window's
-//! first xi steps are the means predicted before it, which stay as they were, or samples where there was no prediction
-//! yet.
+//! Channels can be left out of ln L_reg, or count in part. The gradient is exact: it also runs through the means that the window
+//! feeds back to itself. Inputs of the window's first xi steps are the means predicted before it, which stay as they were, or
+//! samples where there was no prediction yet.
+//!
+//! # At the thesis' rate the ascent is chaotic
+//!
+//! alpha_reg is a fixed step, however steep the likelihood is. On trained networks with many context units the iterations do not
+//! converge at the thesis' rate but jump about, and small differences grow: two regressions whose states differ by 1e-15 differ by
+//! 0.26 ten samples later. The same samples still give the same bits, on any instruction set. But whatever rounds otherwise (samples
+//! that went through another unit, a network that was trained by another version) leads to other states, and so to other reaction
+//! times. Compare averages over many trials, never one trial with another.
 
 use aligned_vec::AVec;
 use pulp::{Simd, WithSimd};
 
 use crate::backward::retreat;
-use crate::engine::{InstructionSet, Run};
+use crate::engine::{Engine, InstructionSet, Run};
 use crate::error::{Error, Result};
 use crate::forward::{activate, advance};
 use crate::kernels::activation::{exp_slice, tanh_rows};
@@ -93,7 +101,7 @@ impl ErrorRegression {
         network: &Network,
         initial_state: &[f64],
         options: ErrorRegressionOptions,
-        set: InstructionSet,
+        engine: &Engine,
     ) -> Result<Self> {
         let topology = &network.topology;
         let (n_x, n_c, delay) = (topology.channels(), topology.context_units(), topology.delay());
@@ -102,6 +110,7 @@ impl ErrorRegression {
             let what = "the initial state".to_owned();
             return Err(Error::Length { what, found: initial_state.len(), needed: n_c });
         }
+        let set = engine.instruction_set();
         let mut packed = Packed::new(topology, set);
         packed.fill(&network.parameters);
         let mut to_input = Panels::zeros(n_x, n_c, chains_for(n_x), set);
@@ -207,7 +216,7 @@ impl ErrorRegression {
     /// # Panics
     /// If that is further ahead than the options ask for.
     #[must_use]
-    pub fn foreseen_mean(&self, steps: usize) -> &[f64] {
+    pub fn forecast_mean(&self, steps: usize) -> &[f64] {
         self.check_ahead(steps);
         self.mean_of(self.length + 1 + steps)
     }
@@ -215,9 +224,9 @@ impl ErrorRegression {
     /// v of that sample; empty without variance units.
     ///
     /// # Panics
-    /// As [`ErrorRegression::foreseen_mean`].
+    /// As [`ErrorRegression::forecast_mean`].
     #[must_use]
-    pub fn foreseen_variance(&self, steps: usize) -> &[f64] {
+    pub fn forecast_variance(&self, steps: usize) -> &[f64] {
         self.check_ahead(steps);
         let n_v = self.next_variance.len() / (1 + self.options.ahead);
         &self.next_variance[steps * n_v..(steps + 1) * n_v]
@@ -226,9 +235,9 @@ impl ErrorRegression {
     /// The context that predicts it, N_C values.
     ///
     /// # Panics
-    /// As [`ErrorRegression::foreseen_mean`].
+    /// As [`ErrorRegression::forecast_mean`].
     #[must_use]
-    pub fn foreseen_context(&self, steps: usize) -> &[f64] {
+    pub fn forecast_context(&self, steps: usize) -> &[f64] {
         self.check_ahead(steps);
         &self.states[(self.length + 1 + steps) * self.packed.state_stride..][..self.packed.n_c]
     }
@@ -243,7 +252,7 @@ impl ErrorRegression {
     /// # Panics
     /// If there is no such step.
     #[must_use]
-    pub fn postdicted_mean(&self, step: usize) -> &[f64] {
+    pub fn smoothed_mean(&self, step: usize) -> &[f64] {
         assert!(step <= self.length, "step {step} of a window of {}", self.length);
         self.mean_of(step + 1)
     }
@@ -373,10 +382,10 @@ impl ErrorRegression {
             precisions: &mut self.precisions,
         }
         .score(simd, self.floor);
-        if self.options.heeded.iter().any(|share| *share != 1.0) {
+        if self.options.mask.iter().any(|share| *share != 1.0) {
             let lists = [&mut self.mean_delta, &mut self.variance_delta, &mut self.terms, &mut self.squares];
             for row in lists.into_iter().flat_map(|list| list.chunks_exact_mut(n_x).take(self.length)) {
-                row.iter_mut().zip(&self.options.heeded).for_each(|(value, share)| *value *= share);
+                row.iter_mut().zip(&self.options.mask).for_each(|(value, share)| *value *= share);
             }
         }
         (self.terms[..len].iter().sum(), self.squares[..len].iter().sum())

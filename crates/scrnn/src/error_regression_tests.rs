@@ -64,7 +64,7 @@ fn plain(
     first: usize,
     steps: usize,
     shares: &[f64],
-    heeded: &[f64],
+    mask: &[f64],
 ) -> f64 {
     let delay = network.topology.delay();
     let mut state = Plain::new(network, tail);
@@ -82,7 +82,7 @@ fn plain(
                 Some(&v) => ln_gaussian(*target, state.y[i], v),
                 None => -0.5 * (target - state.y[i]).powi(2),
             };
-            sum += heeded[i] * term;
+            sum += mask[i] * term;
         }
     }
     sum
@@ -90,7 +90,7 @@ fn plain(
 
 #[test]
 fn the_gradient_at_the_tail_agrees_with_central_differences() {
-    for (delay, variance, count, shares, heeded) in [
+    for (delay, variance, count, shares, mask) in [
         (1, true, 30, [0.0; 3], [1.0; 3]),
         (1, false, 5, [0.0; 3], [1.0; 3]),
         (2, true, 30, [0.25, 0.0, 1.0], [1.0; 3]),
@@ -102,18 +102,19 @@ fn the_gradient_at_the_tail_agrees_with_central_differences() {
             window: 12,
             iterations: 0,
             sensed_in_window: shares.to_vec(),
-            heeded: heeded.to_vec(),
+            mask: mask.to_vec(),
             ..ErrorRegressionOptions::new(3)
         };
         for set in InstructionSet::available() {
-            let mut regression = ErrorRegression::new(&network, &u0(&network), options.clone(), set).unwrap();
+            let mut regression =
+                ErrorRegression::new(&network, &u0(&network), options.clone(), &Engine::new(1, set).unwrap()).unwrap();
             observe_all(&mut regression, count);
             let (steps, tail) = (regression.window(), regression.tail().to_vec());
             assert_eq!(steps, 12.min(count - delay));
             let first = count - delay - steps;
             let before = regression.mean[3..3 * (delay + 1)].to_vec();
             let (ln_likelihood, gradient) = set.run(Evaluate(&mut regression));
-            let at = |tail: &[f64]| plain(&network, tail, &before, first, steps, &shares, &heeded);
+            let at = |tail: &[f64]| plain(&network, tail, &before, first, steps, &shares, &mask);
             assert!((ln_likelihood - at(&tail)).abs() < 1e-10 * (1.0 + ln_likelihood.abs()));
             for i in 0..tail.len() {
                 let moved = |by: f64| {
@@ -140,7 +141,7 @@ fn without_iterations_it_predicts_as_the_open_loop_does() {
         let network = network(delay, true, fast_and_slow());
         let options = ErrorRegressionOptions { window: 4, iterations: 0, ..ErrorRegressionOptions::new(3) };
         let u0 = u0(&network);
-        let mut regression = ErrorRegression::new(&network, &u0, options, InstructionSet::best()).unwrap();
+        let mut regression = ErrorRegression::new(&network, &u0, options, &Engine::serial()).unwrap();
         let sensed: Vec<f64> = (0..25).flat_map(sample).collect();
         let options = GenerationOptions { steps: 25, feedback: Feedback::open(3), seed: 1, contexts: true };
         let start = Start { initial_state: &u0, sensed: &sensed };
@@ -181,7 +182,7 @@ fn regression_finds_the_state_that_explains_a_stream_and_leaves_fast_units_alone
     };
     let run = |iterations| {
         let options = ErrorRegressionOptions { iterations, ..options.clone() };
-        let mut regression = ErrorRegression::new(&network, &other, options, InstructionSet::best()).unwrap();
+        let mut regression = ErrorRegression::new(&network, &other, options, &Engine::serial()).unwrap();
         let (mut late, mut first) = (0.0, None);
         for (t, sample) in [[0.1; 3]; 2].iter().map(|x| &x[..]).chain(stream.chunks(3)).enumerate() {
             if t >= 40 {
@@ -206,7 +207,7 @@ fn small_steps_always_lead_uphill() {
     for momentum in [0.0, 0.5] {
         let ascent = Ascent::Momentum { rate: 1e-4, momentum };
         let options = ErrorRegressionOptions { ascent, ..ErrorRegressionOptions::new(3) };
-        let mut regression = ErrorRegression::new(&network, &u0(&network), options, InstructionSet::best()).unwrap();
+        let mut regression = ErrorRegression::new(&network, &u0(&network), options, &Engine::serial()).unwrap();
         for t in 0..60 {
             let done = regression.observe(&sample(t), &mut || true).unwrap();
             assert_eq!(done.iterations, if t < 2 { 0 } else { 10 });
@@ -220,7 +221,7 @@ fn a_step_out_of_the_finite_numbers_is_taken_back_and_told() {
     let network = network(1, true, fast_and_slow());
     let ascent = Ascent::Momentum { rate: 1e307, momentum: 0.9 };
     let options = ErrorRegressionOptions { ascent, ..ErrorRegressionOptions::new(3) };
-    let mut regression = ErrorRegression::new(&network, &u0(&network), options, InstructionSet::best()).unwrap();
+    let mut regression = ErrorRegression::new(&network, &u0(&network), options, &Engine::serial()).unwrap();
     let mut diverged = 0;
     for t in 0..40 {
         // Far from all that the network can predict: steep enough for the rate to overflow.
@@ -236,7 +237,7 @@ fn a_step_out_of_the_finite_numbers_is_taken_back_and_told() {
 fn a_control_loop_can_stop_it_at_any_iteration() {
     let network = network(1, true, fast_and_slow());
     let options = ErrorRegressionOptions { iterations: 50, ..ErrorRegressionOptions::new(3) };
-    let mut regression = ErrorRegression::new(&network, &u0(&network), options, InstructionSet::best()).unwrap();
+    let mut regression = ErrorRegression::new(&network, &u0(&network), options, &Engine::serial()).unwrap();
     observe_all(&mut regression, 5);
     let mut asked = 0;
     let mut go_on = || {
@@ -258,7 +259,7 @@ fn senseless_requests_are_refused_and_leave_no_trace() {
     let refuse = |change: &dyn Fn(&mut ErrorRegressionOptions)| {
         let mut options = ErrorRegressionOptions::new(3);
         change(&mut options);
-        ErrorRegression::new(&network, &u0(&network), options, set).unwrap_err().to_string()
+        ErrorRegression::new(&network, &u0(&network), options, &Engine::new(1, set).unwrap()).unwrap_err().to_string()
     };
     assert!(refuse(&|options| options.window = 0).starts_with("the window is 0"));
     assert!(refuse(&|options| options.ascent = Ascent::Adam { rate: -1.0 }).contains("rate is -1"));
@@ -266,7 +267,7 @@ fn senseless_requests_are_refused_and_leave_no_trace() {
     assert!(refuse(&|options| options.sensed_in_window[1] = 1.5).contains("is 1.5; needed: numbers from 0 to 1"));
 
     let options = ErrorRegressionOptions::new(3);
-    let mut regression = ErrorRegression::new(&network, &u0(&network), options, set).unwrap();
+    let mut regression = ErrorRegression::new(&network, &u0(&network), options, &Engine::new(1, set).unwrap()).unwrap();
     observe_all(&mut regression, 4);
     let before = regression.mean().to_vec();
     assert!(regression.observe(&[0.0, f64::NAN, 0.0], &mut || true).unwrap_err().to_string().contains("is NaN"));
@@ -275,7 +276,7 @@ fn senseless_requests_are_refused_and_leave_no_trace() {
 }
 
 #[test]
-fn what_is_foreseen_is_what_generation_gives_once_samples_run_out() {
+fn what_is_forecast_is_what_generation_gives_once_samples_run_out() {
     for (delay, count) in [(1, 9), (3, 2), (3, 3), (3, 4), (5, 30)] {
         let network = network(delay, true, fast_and_slow());
         let (iterations, ahead) = (0, 8);
@@ -286,7 +287,7 @@ fn what_is_foreseen_is_what_generation_gives_once_samples_run_out() {
             sensed: vec![1.0, 0.0, 0.5],
             ..ErrorRegressionOptions::new(3)
         };
-        let mut regression = ErrorRegression::new(&network, &u0(&network), options, InstructionSet::best()).unwrap();
+        let mut regression = ErrorRegression::new(&network, &u0(&network), options, &Engine::serial()).unwrap();
         observe_all(&mut regression, count);
         if count < delay {
             continue;
@@ -302,11 +303,11 @@ fn what_is_foreseen_is_what_generation_gives_once_samples_run_out() {
         for steps in 0..=ahead {
             let row = count - delay + steps;
             let own = |list: &[f64], size: usize| list[row * size..(row + 1) * size].to_vec();
-            let found = regression.foreseen_mean(steps);
+            let found = regression.forecast_mean(steps);
             assert!(close(found, &own(&generated.mean, 3)), "delay {delay}, {count} samples, {steps} ahead: {found:?}");
-            assert!(close(regression.foreseen_variance(steps), &own(&generated.variance, 3)));
-            assert!(close(regression.foreseen_context(steps), &own(&generated.contexts, 13)));
+            assert!(close(regression.forecast_variance(steps), &own(&generated.variance, 3)));
+            assert!(close(regression.forecast_context(steps), &own(&generated.contexts, 13)));
         }
-        assert_eq!(regression.foreseen_mean(0), regression.mean());
+        assert_eq!(regression.forecast_mean(0), regression.mean());
     }
 }

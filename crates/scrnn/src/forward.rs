@@ -14,6 +14,7 @@
 use pulp::Simd;
 
 use crate::batch::Block;
+use crate::dataset::Sequence;
 use crate::kernels::activation::tanh_rows;
 use crate::kernels::copy_few;
 use crate::kernels::panels::{Columns, Product, multiply};
@@ -115,27 +116,29 @@ pub(crate) fn advance<S: Simd>(
     }
 }
 
-/// Puts initial states, one of N_C values for each item, into the running internal states.
+/// Puts initial states, one of N_C values for each run, into the running internal states.
 pub(crate) fn start(packed: &Packed, block: &Block, initial: &[f64], trajectory: &mut Trajectory) {
-    for (&item, u) in block.items.iter().zip(trajectory.internal.chunks_exact_mut(packed.rows)) {
+    for (&run, u) in block.runs.iter().zip(trajectory.internal.chunks_exact_mut(packed.rows)) {
         u.fill(0.0);
-        u[..packed.n_c].copy_from_slice(&initial[item * packed.n_c..(item + 1) * packed.n_c]);
+        u[..packed.n_c].copy_from_slice(&initial[run * packed.n_c..(run + 1) * packed.n_c]);
     }
 }
 
-/// Prepares a span: its inputs, and the context where it starts.
+/// Prepares a span: its inputs, and the context where it starts. A column that has ended needs no input.
 #[inline(always)]
 pub(crate) fn enter_span<S: Simd>(
     simd: S,
     packed: &Packed,
     block: &Block,
+    sequences: &[Sequence],
     span: std::ops::Range<usize>,
     trajectory: &mut Trajectory,
 ) {
     let (n, stride) = (block.columns(), packed.state_stride);
-    for (row, states) in span.zip(trajectory.states.chunks_exact_mut(n * stride)) {
-        let inputs = block.sample_row(row).chunks_exact(packed.n_x);
-        for (x, state) in inputs.zip(states.chunks_exact_mut(stride)) {
+    for (column, &sequence) in block.sequences.iter().enumerate() {
+        let inputs = sequences[sequence].values().chunks_exact(packed.n_x).skip(span.start).take(span.len());
+        for (x, states) in inputs.zip(trajectory.states.chunks_exact_mut(n * stride)) {
+            let state = &mut states[column * stride..(column + 1) * stride];
             copy_few(&mut state[packed.rows..packed.rows + packed.n_x], x);
             state[packed.rows + packed.n_x] = 1.0;
         }

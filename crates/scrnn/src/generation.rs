@@ -9,7 +9,6 @@
 //! samples where there are any, else 0; once sensed samples run out, the predictions are fed back.
 
 use pulp::{Simd, WithSimd};
-use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
@@ -18,6 +17,7 @@ use crate::error::{Error, Result};
 use crate::network::Network;
 use crate::packed::Packed;
 use crate::stepper::Stepper;
+use crate::streams::{Purpose, stream};
 
 mod running;
 
@@ -67,19 +67,43 @@ pub struct Start<'a> {
 
 /// How to generate.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct GenerationOptions {
     /// Steps to predict.
     pub steps: usize,
     /// Where inputs come from.
     pub feedback: Feedback,
-    /// Seed of the noise; start k draws from stream k.
+    /// Seed of the noise; each start draws from a stream of its own.
     pub seed: u64,
     /// Whether to record the contexts.
     pub contexts: bool,
 }
 
+impl GenerationOptions {
+    /// So many steps with these inputs; the noise has seed 1, and contexts are not recorded.
+    #[must_use]
+    pub fn new(steps: usize, feedback: Feedback) -> Self {
+        Self { steps, feedback, seed: 1, contexts: false }
+    }
+
+    /// The same with another seed of the noise.
+    #[must_use]
+    pub fn seed(mut self, seed: u64) -> Self {
+        self.seed = seed;
+        self
+    }
+
+    /// The same with the contexts recorded, or not.
+    #[must_use]
+    pub fn contexts(mut self, contexts: bool) -> Self {
+        self.contexts = contexts;
+        self
+    }
+}
+
 /// One generated sequence, in the network's units; row k is the prediction of sample k + xi.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
 pub struct Generated {
     /// y, `[steps, N_O]`.
     pub mean: Vec<f64>,
@@ -90,9 +114,6 @@ pub struct Generated {
     /// c, `[steps, N_C]`; empty unless asked for.
     pub contexts: Vec<f64>,
 }
-
-/// Sets generation's noise apart: data that were made from the same seed must not come back as what a network draws.
-const DOMAIN: u64 = 0x6765_6E65_7261_7465;
 
 /// Columns that one thread steps at a time.
 const COLUMNS: usize = 6;
@@ -126,12 +147,12 @@ pub fn generate(
     let mut jobs: Vec<Job<'_>> = starts
         .chunks(COLUMNS)
         .enumerate()
-        .map(|(index, starts)| Job { starts, stream: (index * COLUMNS) as u64, out: Vec::new() })
+        .map(|(index, starts)| Job { starts, first: index * COLUMNS, out: Vec::new() })
         .collect();
     let (delay, floor, variance) = (topology.delay(), topology.variance_floor(), topology.has_variance());
     engine.for_each(&mut jobs, |job| {
-        let (packed, starts, stream) = (&packed, job.starts, job.stream);
-        job.out = engine.instruction_set().run(Generate { packed, delay, floor, variance, options, starts, stream });
+        let (packed, starts, first) = (&packed, job.starts, job.first);
+        job.out = engine.instruction_set().run(Generate { packed, delay, floor, variance, options, starts, first });
     });
     Ok(jobs.into_iter().flat_map(|job| job.out).collect())
 }
@@ -152,7 +173,8 @@ fn check(feedback: &Feedback, n_x: usize) -> Result<()> {
 
 struct Job<'a> {
     starts: &'a [Start<'a>],
-    stream: u64,
+    /// Number of the first start.
+    first: usize,
     out: Vec<Generated>,
 }
 
@@ -163,7 +185,7 @@ struct Generate<'a> {
     variance: bool,
     options: &'a GenerationOptions,
     starts: &'a [Start<'a>],
-    stream: u64,
+    first: usize,
 }
 
 impl WithSimd for Generate<'_> {
@@ -171,16 +193,14 @@ impl WithSimd for Generate<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Vec<Generated> {
-        let Self { packed, delay, floor, variance, options, starts, stream } = self;
+        let Self { packed, delay, floor, variance, options, starts, first } = self;
         let (n_x, columns) = (packed.n_x, starts.len());
         let mut stepper = Stepper::new(packed, columns);
         let mut out = vec![Generated::default(); columns];
         let mut random = Vec::with_capacity(columns);
         for (column, start) in starts.iter().enumerate() {
             stepper.start(packed, column, start.initial_state);
-            let mut own = ChaCha8Rng::seed_from_u64(options.seed ^ DOMAIN);
-            own.set_stream(stream + column as u64);
-            random.push(own);
+            random.push(stream(options.seed, Purpose::Generation, (first + column) as u64));
             out[column].mean.reserve_exact(options.steps * n_x);
             out[column].sample.reserve_exact(options.steps * n_x);
         }

@@ -6,6 +6,7 @@
 //!
 //! The sums run over units whose group learns its initial state; all others start from 0 and stay there.
 
+use crate::error::{Error, Result};
 use crate::topology::Topology;
 
 /// u_0 for every sequence, and the mean u.
@@ -22,6 +23,35 @@ impl InitialStates {
     pub fn zeros(topology: &Topology, sequences: usize) -> Self {
         let units = topology.context_units();
         Self { units, values: vec![0.0; sequences * units], mean: vec![0.0; units] }
+    }
+
+    /// Given values: u_0 of all sequences, row-major `[S, N_C]`, and their mean.
+    ///
+    /// # Errors
+    /// [`Error::Length`] if they do not fit the topology's context units.
+    pub fn new(topology: &Topology, values: Vec<f64>, mean: Vec<f64>) -> Result<Self> {
+        let units = topology.context_units();
+        if !values.len().is_multiple_of(units) {
+            let needed = values.len().next_multiple_of(units);
+            return Err(Error::Length { what: "the list of initial states".to_owned(), found: values.len(), needed });
+        }
+        let states = Self { units, values, mean };
+        states.check_for(topology)?;
+        Ok(states)
+    }
+
+    /// Checks that these are states of a network of this topology.
+    ///
+    /// # Errors
+    /// [`Error::Length`] for another number of context units.
+    pub fn check_for(&self, topology: &Topology) -> Result<()> {
+        let needed = topology.context_units();
+        for (what, found) in [("an initial state", self.units), ("the mean of the initial states", self.mean.len())] {
+            if found != needed {
+                return Err(Error::Length { what: what.to_owned(), found, needed });
+            }
+        }
+        Ok(())
     }
 
     /// Number of sequences.
@@ -66,17 +96,8 @@ impl InitialStates {
     /// ln L_init of (2.16) in nats, constant included.
     #[must_use]
     pub fn ln_prior(&self, topology: &Topology, variance: f64) -> f64 {
-        let constant = -0.5 * (2.0 * std::f64::consts::PI * variance).ln();
-        let mut sum = 0.0;
-        for u0 in self.values.chunks_exact(self.units) {
-            let learned = topology.per_unit(|group| group.learns_initial_state);
-            for ((&u0, &mean), learned) in u0.iter().zip(&self.mean).zip(learned) {
-                if learned {
-                    sum += constant - (u0 - mean).powi(2) / (2.0 * variance);
-                }
-            }
-        }
-        sum
+        let states = self.values.chunks_exact(self.units);
+        states.fold(0.0, |sum, u0| add_ln_prior(sum, topology, variance, u0, &self.mean))
     }
 
     /// Adds the prior's part of the gradient to `states`, and writes the mean's gradient into `mean`:
@@ -98,4 +119,16 @@ impl InitialStates {
             }
         }
     }
+}
+
+/// Adds ln L_init of one sequence (2.16) to `sum`, unit after unit.
+pub(crate) fn add_ln_prior(mut sum: f64, topology: &Topology, variance: f64, u0: &[f64], mean: &[f64]) -> f64 {
+    let constant = -0.5 * (2.0 * std::f64::consts::PI * variance).ln();
+    let learned = topology.per_unit(|group| group.learns_initial_state);
+    for ((&u0, &mean), learned) in u0.iter().zip(mean).zip(learned) {
+        if learned {
+            sum += constant - (u0 - mean).powi(2) / (2.0 * variance);
+        }
+    }
+    sum
 }

@@ -3,18 +3,18 @@
 //! Weights from the input are uniform in `[-1/N_I, 1/N_I]`, all other weights in `[-1/N_C, 1/N_C]`, biases in [-1, 1]; every
 //! initial state starts from 0 and the mean of a learned one from a uniform value in `[-1/N_C, 1/N_C]`.
 
-use rand::rngs::ChaCha8Rng;
-use rand::{RngExt, SeedableRng};
+use rand::RngExt;
 
 use crate::initial_states::InitialStates;
 use crate::network::Network;
 use crate::parameters::{Block, Parameters};
+use crate::streams::{Purpose, stream};
 use crate::topology::Topology;
 
 /// A network and the initial states of `sequences` sequences before learning.
 #[must_use]
 pub fn initialize(topology: &Topology, sequences: usize, seed: u64) -> (Network, InitialStates) {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut random = stream(seed, Purpose::InitialWeights, 0);
     let mut uniform = |bound: f64| bound * (2.0 * random.random::<f64>() - 1.0);
     let (n_x, n_c) = (topology.channels(), topology.context_units());
     let from_input = 1.0 / n_x as f64;

@@ -25,6 +25,8 @@ pub(crate) struct Packed {
     pub n_c: usize,
     /// N_I = N_O.
     pub n_x: usize,
+    /// xi.
+    pub delay: usize,
     /// Mean and variance units together.
     pub n_out: usize,
     /// Rows of the joint product: context, mean, variance, padding.
@@ -71,6 +73,7 @@ impl Packed {
         Self {
             n_c,
             n_x,
+            delay: topology.delay(),
             n_out,
             rows,
             state_stride: stride(rows + n_x + 1),

@@ -114,6 +114,24 @@ impl Parameters {
         Self { values: vec![0.0; ranges[6].end], ranges }
     }
 
+    /// How many values there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.values.len()
+    }
+
+    /// Whether there are none, which no topology allows.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.values.is_empty()
+    }
+
+    /// Whether the blocks are as large as those of `other`.
+    #[must_use]
+    pub fn has_the_shape_of(&self, other: &Self) -> bool {
+        self.ranges == other.ranges
+    }
+
     /// All blocks as one list.
     #[must_use]
     pub fn as_slice(&self) -> &[f64] {

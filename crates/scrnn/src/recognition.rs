@@ -1,24 +1,34 @@
 //! Recognition (thesis 2.9): from a sequence back to the initial state that reproduces it.
 //!
-//! The ascent of learning, in u_0 only. All starts of all sequences are columns of one batch; each is moved by its own
-//! Adam on ln L_all per step and channel, and its best state is kept.
+//! ```text
+//! u_0 = arg max ln L_all,   ln L_all = ln L_out(sequence | u_0) + ln L_init(u_0)       (2.11), (2.16), (2.15)
+//! ```
+//!
+//! The ascent of learning, in u_0 only. All starts of all sequences are columns, each moved by its own Adam on ln L_all per step and
+//! channel, and its best state is kept. The best start of each sequence is the one of the highest ln L_all, which is what was climbed;
+//! it is then polished by L-BFGS until nothing to speak of is gained. Columns do not know of each other: neither threads nor
+//! which other sequences are recognised change a bit.
 
 use std::fmt;
 
-use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::batch::Item;
 use crate::dataset::Dataset;
-use crate::engine::Engine;
 use crate::error::{Error, Result};
-use crate::initial_states::InitialStates;
+use crate::initial_states::{InitialStates, add_ln_prior};
 use crate::network::Network;
-use crate::objective::{Objective, Want};
+use crate::objective::{Backend, Evaluation, Objective, Request, Run, Want};
+use crate::streams::{Purpose, stream};
+
+mod ascent;
+mod polish;
+
+pub use polish::Polish;
 
 /// A kind of starting point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum WarmStart {
     /// All zeros.
     Zero,
@@ -33,6 +43,7 @@ pub enum WarmStart {
 
 /// How to recognise.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct RecognitionOptions {
     /// Starts for each sequence.
     pub starts: usize,
@@ -51,6 +62,12 @@ pub struct RecognitionOptions {
     pub beta2: f64,
     /// sigma^2_IS of the prior around the learned mean.
     pub initial_state_variance: f64,
+    /// The most updates of L-BFGS for the best start; 0 leaves it as it is.
+    pub polish: u64,
+    /// Where the polish ends: ten updates together gained at most this, in nats per step and channel.
+    pub tolerance: f64,
+    /// The most learned sequences that a ranking keeps, the most likely ones.
+    pub ranked: usize,
     /// Kinds of starts, taken in turn; zero and mean once, learned as often as there are sequences.
     pub warm_starts: Vec<WarmStart>,
 }
@@ -66,6 +83,9 @@ impl Default for RecognitionOptions {
             rate: 0.1,
             beta2: 0.999,
             initial_state_variance: 1.0,
+            polish: 500,
+            tolerance: 1e-10,
+            ranked: 100,
             warm_starts: vec![WarmStart::Zero, WarmStart::Mean, WarmStart::Learned, WarmStart::Random],
         }
     }
@@ -73,6 +93,7 @@ impl Default for RecognitionOptions {
 
 /// Where a trial began.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum TrialStart {
     /// All zeros.
     Zero,
@@ -97,23 +118,45 @@ impl fmt::Display for TrialStart {
 
 /// What one start ended in.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Trial {
     /// Where it began.
     pub start: TrialStart,
     /// u_0, N_C values.
     pub initial_state: Vec<f64>,
-    /// ln L_out of the observed samples in nats; -E without variance units.
+    /// ln L_out of the observed samples in nats (2.11); -E without variance units. Minus infinity if it never was a finite number.
     pub ln_likelihood: f64,
+    /// ln L_init of the initial state in nats (2.16), constant included.
+    pub ln_prior: f64,
     /// (3.5) in the network's units: half the squared error per step and channel.
     pub error: f64,
 }
 
+impl RecognitionOptions {
+    /// The defaults with some of them changed.
+    #[must_use]
+    pub fn with(change: impl FnOnce(&mut Self)) -> Self {
+        let mut options = Self::default();
+        change(&mut options);
+        options
+    }
+}
+
+impl Trial {
+    /// ln L_all = ln L_out + ln L_init in nats (2.15): what the ascent climbs, and what trials are ordered by.
+    #[must_use]
+    pub fn ln_joint(&self) -> f64 {
+        self.ln_likelihood + self.ln_prior
+    }
+}
+
 /// How well a learned initial state explains a sequence.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Ranked {
     /// The learned sequence, from 0.
     pub sequence: usize,
-    /// ln L_out of the observed samples in nats.
+    /// ln L_out of the observed samples in nats; minus infinity if it is not finite.
     pub ln_likelihood: f64,
     /// (3.5) in the network's units.
     pub error: f64,
@@ -121,85 +164,64 @@ pub struct Ranked {
 
 /// The result for one sequence.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Recognition {
-    /// All starts, the most likely first.
+    /// All starts, that of the highest ln L_all first; it is the one that was polished.
     pub trials: Vec<Trial>,
-    /// The learned sequences, the most likely first.
+    /// The learned sequences, the most likely first. The prior has no say here: all of them are equally likely before a sample is
+    /// seen.
     pub ranking: Vec<Ranked>,
+    /// How the polish of the best start ended.
+    pub polish: Polish,
 }
 
 /// Finds the initial states that explain the sequences of `data` (in the network's units).
 ///
 /// # Errors
-/// Data that do not fit the network, too few observed samples, or a setting out of range.
+/// Data or initial states that do not fit the network, too few observed samples, or a setting out of range.
 pub fn recognize(
     network: &Network,
     learned: &InitialStates,
     data: &Dataset,
     options: &RecognitionOptions,
-    engine: &Engine,
+    backend: &dyn Backend,
 ) -> Result<Vec<Recognition>> {
-    check(network, data, options)?;
-    let (topology, n_c) = (&network.topology, network.topology.context_units());
-    let steps = |s: usize| {
-        let length = data.sequences()[s].len();
-        options.observed.map_or(length, |observed| observed.min(length)) - topology.delay()
-    };
-    let item = |s: usize| Item { samples: data.sequences()[s].values(), steps: steps(s) };
-    let per_step = |s: usize| (steps(s) * topology.channels()) as f64;
-    let sequences = data.sequences().len();
-
-    // Every learned initial state on every sequence.
-    let mut rankings = vec![Vec::new(); sequences];
-    if learned.sequences() > 0 {
-        let items: Vec<_> = (0..sequences).flat_map(|s| vec![item(s); learned.sequences()]).collect();
-        let mut objective = Objective::new(topology, &items, false, engine);
-        objective.set_parameters(&network.parameters);
-        objective.evaluate(&learned.values().repeat(sequences), Want::Score);
-        for (s, ranking) in rankings.iter_mut().enumerate() {
-            for sequence in 0..learned.sequences() {
-                let index = s * learned.sequences() + sequence;
-                let error = objective.squared_error[index] / (2.0 * per_step(s));
-                ranking.push(Ranked { sequence, ln_likelihood: objective.ln_likelihood[index], error });
-            }
-            ranking.sort_by(|a, b| b.ln_likelihood.total_cmp(&a.ln_likelihood));
-        }
-    }
-
-    let mut origins = Vec::new();
-    let mut states = Vec::new();
-    for (s, ranking) in rankings.iter().enumerate() {
-        let mut random = ChaCha8Rng::seed_from_u64(options.seed);
-        random.set_stream(s as u64);
-        for start in starts(options, ranking) {
-            states.extend(initial_state(network, learned, start, options.random_spread, &mut random));
-            origins.push((s, start));
-        }
-    }
-    let items: Vec<_> = origins.iter().map(|&(s, _)| item(s)).collect();
-    let mut objective = Objective::new(topology, &items, false, engine);
+    check(network, learned, data, options)?;
+    let learns = network.topology.per_unit(|group| group.learns_initial_state).collect();
+    let problem = Problem { network, data, options, mean: learned.mean(), learns };
+    let mut objective = backend.objective(&Request::new(&network.topology, data))?;
     objective.set_parameters(&network.parameters);
-    let scales: Vec<f64> = origins.iter().map(|&(s, _)| per_step(s)).collect();
-    let best = ascend(&mut objective, learned.mean(), states, &scales, options, network);
-
-    let mut results: Vec<Recognition> =
-        rankings.into_iter().map(|ranking| Recognition { trials: Vec::new(), ranking }).collect();
-    for (index, &(s, start)) in origins.iter().enumerate() {
-        results[s].trials.push(Trial {
-            start,
-            initial_state: best.states[index * n_c..(index + 1) * n_c].to_vec(),
-            ln_likelihood: best.ln_likelihood[index],
-            error: best.squared_error[index] / (2.0 * scales[index]),
-        });
+    let objective = objective.as_mut();
+    let mut results: Vec<Recognition> = Vec::with_capacity(data.sequences().len());
+    let places = Places::new(learned, &problem.learns, options.random_spread);
+    let (mut waiting, width) = (Vec::new(), problem.columns_at_a_time());
+    for (s, mut ranking) in problem.rank(learned, objective).into_iter().enumerate() {
+        let starts = starts(options, &ranking);
+        ranking.truncate(options.ranked);
+        ranking.shrink_to_fit();
+        results.push(Recognition { trials: Vec::with_capacity(starts.len()), ranking, polish: Polish::default() });
+        let mut random = stream(options.seed, Purpose::RecognitionStarts, s as u64);
+        for start in starts {
+            waiting.push(Origin { sequence: s, start, state: places.state(start, &mut random) });
+            if waiting.len() == width {
+                ascent::ascend(&problem, objective, &mut waiting, &mut results);
+            }
+        }
     }
+    ascent::ascend(&problem, objective, &mut waiting, &mut results);
     for result in &mut results {
-        result.trials.sort_by(|a, b| b.ln_likelihood.total_cmp(&a.ln_likelihood));
+        result.trials.sort_by(|a, b| b.ln_joint().total_cmp(&a.ln_joint()));
     }
+    polish::polish(&problem, objective, &mut results);
     Ok(results)
 }
 
-fn check(network: &Network, data: &Dataset, options: &RecognitionOptions) -> Result<()> {
+fn check(network: &Network, learned: &InitialStates, data: &Dataset, options: &RecognitionOptions) -> Result<()> {
     data.check_for(&network.topology)?;
+    let (found, needed) = (learned.mean().len(), network.topology.context_units());
+    if found != needed {
+        return Err(Error::Length { what: "the mean of the learned initial states".to_owned(), found, needed });
+    }
     let setting = |what, found: String, needed| Err(Error::Setting { what, found, needed });
     let delay = network.topology.delay();
     if options.observed.is_some_and(|observed| observed <= delay) {
@@ -211,6 +233,9 @@ fn check(network: &Network, data: &Dataset, options: &RecognitionOptions) -> Res
     if options.warm_starts.is_empty() {
         return setting("the list of starts", "empty".to_owned(), "at least one kind");
     }
+    if learned.sequences() == 0 && options.warm_starts.iter().all(|kind| *kind == WarmStart::Learned) {
+        return setting("the list of starts", "learned states, of which there are none".to_owned(), "another kind");
+    }
     if !(0.0..1.0).contains(&options.beta2) {
         return setting("beta2", options.beta2.to_string(), "a number from 0 to below 1");
     }
@@ -220,7 +245,118 @@ fn check(network: &Network, data: &Dataset, options: &RecognitionOptions) -> Res
             return setting(what, value.to_string(), "a positive number");
         }
     }
+    if !(options.tolerance >= 0.0 && options.tolerance.is_finite()) {
+        return setting("tolerance", options.tolerance.to_string(), "0 or a positive number");
+    }
     Ok(())
+}
+
+/// Where a column begins.
+struct Origin {
+    sequence: usize,
+    start: TrialStart,
+    /// u_0.
+    state: Vec<f64>,
+}
+
+/// What is known to all columns.
+struct Problem<'a> {
+    network: &'a Network,
+    data: &'a Dataset,
+    options: &'a RecognitionOptions,
+    /// u of the prior.
+    mean: &'a [f64],
+    /// Whether a unit's initial state is looked for.
+    learns: Vec<bool>,
+}
+
+/// Bytes of samples and states that columns may take at a time. Every column holds the samples of its sequence side by side with
+/// those of others, so that memory would grow with the number of starts if all ran at once.
+const AT_A_TIME: usize = 32 << 20;
+/// Columns that run at once even so: a block of them shares its weights.
+const BLOCK: usize = 6;
+
+impl Problem<'_> {
+    /// Predicted steps of a sequence.
+    fn steps(&self, s: usize) -> usize {
+        let length = self.data.sequences()[s].len();
+        self.options.observed.map_or(length, |observed| observed.min(length)) - self.network.topology.delay()
+    }
+
+    /// Steps times channels: what a value per step and channel is divided by.
+    fn terms(&self, s: usize) -> f64 {
+        (self.steps(s) * self.network.topology.channels()) as f64
+    }
+
+    /// How many columns may run at once. The same for any number of threads, though no bit depends on it.
+    fn columns_at_a_time(&self) -> usize {
+        let longest = (0..self.data.sequences().len()).map(|s| self.steps(s)).max().unwrap_or(0);
+        let topology = &self.network.topology;
+        let samples = (longest + topology.delay()) * topology.channels();
+        // States, gradients and moments, the pairs of the polish, and what a block holds for each column.
+        let own = (8 + 2 * polish::MEMORY) * (topology.context_units() + topology.channels());
+        (AT_A_TIME / ((samples + own) * size_of::<f64>())).max(BLOCK)
+    }
+
+    /// A run through each of these sequences.
+    fn runs(&self, sequences: impl Iterator<Item = usize>) -> Vec<Run> {
+        sequences.map(|s| Run::new(s, self.steps(s))).collect()
+    }
+
+    /// ln L_init of one initial state.
+    fn ln_prior(&self, u0: &[f64]) -> f64 {
+        add_ln_prior(0.0, &self.network.topology, self.options.initial_state_variance, u0, self.mean)
+    }
+
+    /// s of u_0 = mean + s z, which no prior makes stiff: s = min(sigma_IS, 1), as in learning.
+    fn scale(&self) -> f64 {
+        self.options.initial_state_variance.sqrt().min(1.0)
+    }
+
+    /// d ln L_all / dz of unit `i`, where `gradient` is d ln L_out / d u_0.
+    fn slope(&self, i: usize, gradient: f64, u0: f64) -> f64 {
+        let pull = (u0 - self.mean[i]) / self.options.initial_state_variance;
+        self.scale() * (gradient - pull)
+    }
+
+    /// The units whose initial state is looked for.
+    fn units(&self) -> impl Iterator<Item = usize> {
+        (0..self.learns.len()).filter(|i| self.learns[*i])
+    }
+
+    /// Every learned initial state on every sequence; of each sequence the best, as many as are reported or started from.
+    fn rank(&self, learned: &InitialStates, objective: &mut dyn Objective) -> Vec<Vec<Ranked>> {
+        let (sequences, count) = (self.data.sequences().len(), learned.sequences());
+        let kept = self.options.ranked.max(self.options.starts).min(count);
+        let mut rankings = Vec::with_capacity(sequences);
+        let mut ranking = Vec::with_capacity(count);
+        if count == 0 {
+            return vec![Vec::new(); sequences];
+        }
+        let pairs = sequences * count;
+        let width = self.columns_at_a_time();
+        let mut found = Evaluation::new(&self.network.topology);
+        for first in (0..pairs).step_by(width) {
+            let pairs = first..(first + width).min(pairs);
+            let runs = self.runs(pairs.clone().map(|pair| pair / count));
+            let initial: Vec<f64> = pairs.clone().flat_map(|pair| learned.sequence(pair % count)).copied().collect();
+            objective.evaluate(&runs, &initial, Want::Score, &mut found);
+            for (index, pair) in pairs.enumerate() {
+                let ln_likelihood = found.ln_likelihood[index];
+                ranking.push(Ranked {
+                    sequence: pair % count,
+                    ln_likelihood: if ln_likelihood.is_finite() { ln_likelihood } else { f64::NEG_INFINITY },
+                    error: found.squared_error[index] / (2.0 * self.terms(pair / count)),
+                });
+                if ranking.len() == count {
+                    ranking.sort_by(|a: &Ranked, b| b.ln_likelihood.total_cmp(&a.ln_likelihood));
+                    rankings.push(ranking[..kept].to_vec());
+                    ranking.clear();
+                }
+            }
+        }
+        rankings
+    }
 }
 
 /// The starts of one sequence: the kinds in turn, each as often as it makes sense.
@@ -248,210 +384,43 @@ fn starts(options: &RecognitionOptions, ranking: &[Ranked]) -> Vec<TrialStart> {
     starts
 }
 
-fn initial_state(
-    network: &Network,
-    learned: &InitialStates,
-    start: TrialStart,
-    spread: f64,
-    random: &mut ChaCha8Rng,
-) -> Vec<f64> {
-    let learns: Vec<bool> = network.topology.per_unit(|group| group.learns_initial_state).collect();
-    let n = learned.sequences().max(1) as f64;
-    let of = |i: usize| (0..learned.sequences()).map(move |s| learned.sequence(s)[i]);
-    let draw = |i: usize, random: &mut ChaCha8Rng| {
-        let mean = of(i).sum::<f64>() / n;
-        let variance = of(i).map(|u| (u - mean).powi(2)).sum::<f64>() / n;
-        // Even where nothing was learned, starts must differ.
-        let z: f64 = StandardNormal.sample(random);
-        mean + (spread * variance.sqrt()).max(1e-3) * z
-    };
-    (0..learns.len())
-        .map(|i| match start {
-            _ if !learns[i] => 0.0,
-            TrialStart::Zero => 0.0,
-            TrialStart::Mean => learned.mean()[i],
-            TrialStart::Learned(s) => learned.sequence(s)[i],
-            TrialStart::Random => draw(i, random),
-        })
-        .collect()
+/// Where starts lie.
+struct Places<'a> {
+    learned: &'a InitialStates,
+    learns: &'a [bool],
+    /// Mean and standard deviation of the random starts in each unit.
+    normal: Vec<(f64, f64)>,
 }
 
-/// The best states met, and what they are worth.
-struct Best {
-    states: Vec<f64>,
-    ln_likelihood: Vec<f64>,
-    squared_error: Vec<f64>,
-}
-
-/// Adam on z, u_0 = mean + s z, s = min(sigma_IS, 1), as in learning.
-fn ascend(
-    objective: &mut Objective,
-    mean: &[f64],
-    mut states: Vec<f64>,
-    scales: &[f64],
-    options: &RecognitionOptions,
-    network: &Network,
-) -> Best {
-    let beta = (0.9, options.beta2);
-    let n_c = mean.len();
-    let learns: Vec<bool> = network.topology.per_unit(|group| group.learns_initial_state).collect();
-    let variance = options.initial_state_variance;
-    let s = variance.sqrt().min(1.0);
-    let (mut first, mut second) = (vec![0.0; states.len()], vec![0.0; states.len()]);
-    let count = scales.len();
-    let mut best = Best {
-        states: states.clone(),
-        ln_likelihood: vec![f64::NEG_INFINITY; count],
-        squared_error: vec![f64::INFINITY; count],
-    };
-    for epoch in 0..=options.epochs {
-        objective.evaluate(&states, if epoch < options.epochs { Want::InitialStates } else { Want::Score });
-        let phase = std::f64::consts::PI * epoch as f64 / options.epochs.max(1) as f64;
-        let rate = options.rate * 0.5 * (1.0 + phase.cos());
-        let correct = |beta: f64| 1.0 / (1.0 - beta.powf(epoch as f64 + 1.0));
-        let (correct_first, correct_second) = (correct(beta.0), correct(beta.1));
-        for (index, scale) in scales.iter().enumerate() {
-            let own = index * n_c..(index + 1) * n_c;
-            let ln_likelihood = objective.ln_likelihood[index];
-            if !ln_likelihood.is_finite() {
-                // Out of bounds: back to the best, at rest.
-                states[own.clone()].copy_from_slice(&best.states[own.clone()]);
-                first[own.clone()].fill(0.0);
-                second[own].fill(0.0);
-                continue;
-            }
-            if ln_likelihood > best.ln_likelihood[index] {
-                best.ln_likelihood[index] = ln_likelihood;
-                best.squared_error[index] = objective.squared_error[index];
-                best.states[own.clone()].copy_from_slice(&states[own.clone()]);
-            }
-            for at in own {
-                let i = at % n_c;
-                if !learns[i] {
-                    continue;
-                }
-                let pull = (states[at] - mean[i]) / variance;
-                let g = s * (objective.initial[at] - pull) / scale;
-                first[at] = beta.0 * first[at] + (1.0 - beta.0) * g;
-                second[at] = beta.1 * second[at] + (1.0 - beta.1) * g * g;
-                let step = first[at] * correct_first / ((second[at] * correct_second).sqrt() + 1e-8);
-                states[at] += s * rate * step;
-            }
-        }
+impl<'a> Places<'a> {
+    fn new(learned: &'a InitialStates, learns: &'a [bool], spread: f64) -> Self {
+        let n = learned.sequences().max(1) as f64;
+        let normal = |i: usize| {
+            let of = || (0..learned.sequences()).map(|s| learned.sequence(s)[i]);
+            let mean = of().sum::<f64>() / n;
+            let variance = of().map(|u| (u - mean).powi(2)).sum::<f64>() / n;
+            // Even where nothing was learned, starts must differ.
+            (mean, (spread * variance.sqrt()).max(1e-3))
+        };
+        Self { learned, learns, normal: (0..learns.len()).map(normal).collect() }
     }
-    best
+
+    /// u_0 of a start.
+    fn state(&self, start: TrialStart, random: &mut ChaCha8Rng) -> Vec<f64> {
+        let draw = |i: usize, random: &mut ChaCha8Rng| {
+            let z: f64 = StandardNormal.sample(random);
+            self.normal[i].0 + self.normal[i].1 * z
+        };
+        let unit = |i: usize| match start {
+            _ if !self.learns[i] => 0.0,
+            TrialStart::Zero => 0.0,
+            TrialStart::Mean => self.learned.mean()[i],
+            TrialStart::Learned(s) => self.learned.sequence(s)[i],
+            TrialStart::Random => draw(i, random),
+        };
+        (0..self.learns.len()).map(unit).collect()
+    }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::dataset::Sequence;
-    use crate::generation::{Feedback, GenerationOptions, Start, generate};
-    use crate::initialization::initialize;
-    use crate::topology::{Group, Prediction, Topology};
-
-    /// A network whose initial state shows in its output for a while, and sequences that it made itself.
-    fn setting() -> (Network, InitialStates, Dataset) {
-        let groups = vec![Group::full("context", 12, 8.0)];
-        let topology = Topology::new(2, 1, groups, Prediction::Mean).unwrap();
-        let (mut network, mut states) = initialize(&topology, 3, 2);
-        network.parameters.as_mut_slice().iter_mut().for_each(|w| *w *= 2.0);
-        for (k, u) in states.values_mut().iter_mut().enumerate() {
-            *u = (1.7 * k as f64).sin();
-        }
-        let feedback = Feedback::closed(2, false);
-        let options = GenerationOptions { steps: 40, feedback, seed: 1, contexts: false };
-        let start = |s: usize| Start { initial_state: states.sequence(s), sensed: &[0.2, -0.1] };
-        let made = generate(&network, &[start(0), start(1), start(2)], &options, &Engine::serial()).unwrap();
-        let sequence = |one: &crate::generation::Generated| {
-            Sequence::new("", 2, [&[0.2, -0.1], one.mean.as_slice()].concat()).unwrap()
-        };
-        let data = Dataset::new(Dataset::numbered_channels(2), made.iter().map(sequence).collect()).unwrap();
-        (network, states, data)
-    }
-
-    fn options() -> RecognitionOptions {
-        RecognitionOptions { starts: 4, epochs: 150, initial_state_variance: 1e8, ..RecognitionOptions::default() }
-    }
-
-    #[test]
-    fn the_ranking_knows_which_sequence_it_is() {
-        let (network, states, data) = setting();
-        let results = recognize(&network, &states, &data, &options(), &Engine::serial()).unwrap();
-        for (s, result) in results.iter().enumerate() {
-            assert_eq!(result.ranking[0].sequence, s);
-            assert!(result.ranking[0].error < 1e-20 && result.ranking[1].error > 1e-6);
-            assert!(result.trials.is_sorted_by(|a, b| a.ln_likelihood >= b.ln_likelihood));
-        }
-    }
-
-    #[test]
-    fn ascent_from_anywhere_explains_a_sequence_better() {
-        let (network, states, data) = setting();
-        let warm_starts = vec![WarmStart::Zero, WarmStart::Random];
-        let ascended = RecognitionOptions { warm_starts: warm_starts.clone(), epochs: 400, ..options() };
-        let untouched = RecognitionOptions { warm_starts, epochs: 0, ..options() };
-        let run = |options| recognize(&network, &states, &data, options, &Engine::serial()).unwrap();
-        for (after, before) in run(&ascended).iter().zip(run(&untouched)) {
-            assert_eq!(after.trials.len(), 4);
-            assert!(after.trials[0].ln_likelihood > before.trials[0].ln_likelihood);
-            let (after, before) = (after.trials[0].error, before.trials[0].error);
-            assert!(after < 0.1 * before, "{before} to {after}");
-        }
-    }
-
-    #[test]
-    fn starts_are_taken_in_turn_and_only_as_often_as_they_differ() {
-        let ranked = |sequence| Ranked { sequence, ln_likelihood: 0.0, error: 0.0 };
-        let of = |warm_starts: &[WarmStart]| {
-            let options = RecognitionOptions { starts: 6, warm_starts: warm_starts.to_vec(), ..options() };
-            starts(&options, &[ranked(2), ranked(0)]).iter().map(ToString::to_string).collect::<Vec<_>>()
-        };
-        let all = of(&[WarmStart::Zero, WarmStart::Learned, WarmStart::Random]);
-        assert_eq!(all, ["zero", "learned 3", "random", "learned 1", "random", "random"]);
-        assert_eq!(of(&[WarmStart::Mean, WarmStart::Learned]), ["mean", "learned 3", "learned 1"]);
-    }
-
-    #[test]
-    fn only_observed_samples_count() {
-        let (network, states, data) = setting();
-        let cut = data.map(|_, x| x);
-        let changed = {
-            let mut values = data.sequences()[0].values().to_vec();
-            values[2 * 20..].fill(0.9);
-            Dataset::new(data.channels().to_vec(), vec![Sequence::new("", 2, values).unwrap()]).unwrap()
-        };
-        let observed = RecognitionOptions { observed: Some(20), ..options() };
-        let run = |data: &Dataset, options| recognize(&network, &states, data, options, &Engine::serial()).unwrap();
-        assert_eq!(run(&cut, &observed)[0], run(&changed, &observed)[0]);
-        assert_ne!(run(&cut, &options())[0], run(&changed, &options())[0]);
-    }
-
-    #[test]
-    fn random_starts_lie_as_far_apart_as_asked() {
-        let (network, states, data) = setting();
-        let distance = |random_spread: f64| -> f64 {
-            let warm_starts = vec![WarmStart::Random];
-            let drawn = RecognitionOptions { starts: 40, epochs: 0, random_spread, warm_starts, ..options() };
-            let results = recognize(&network, &states, &data, &drawn, &Engine::serial()).unwrap();
-            let average = |i: usize| (0..3).map(|s| states.sequence(s)[i]).sum::<f64>() / 3.0;
-            let off = |(i, u): (usize, &f64)| (u - average(i)).powi(2);
-            let trials = results.iter().flat_map(|result| &result.trials);
-            trials.map(|trial| trial.initial_state.iter().enumerate().map(off).sum::<f64>()).sum::<f64>().sqrt()
-        };
-        // The same draws, each at a quarter of its distance.
-        assert!((distance(0.25) / distance(1.0) - 0.25).abs() < 1e-12);
-    }
-
-    #[test]
-    fn senseless_requests_are_refused() {
-        let (network, states, data) = setting();
-        let refuse = |options: RecognitionOptions| {
-            recognize(&network, &states, &data, &options, &Engine::serial()).unwrap_err().to_string()
-        };
-        assert!(refuse(RecognitionOptions { observed: Some(1), ..options() }).contains("more samples than the delay"));
-        assert!(refuse(RecognitionOptions { starts: 0, ..options() }).contains("starts is 0"));
-        assert!(refuse(RecognitionOptions { random_spread: 0.0, ..options() }).contains("random_spread is 0"));
-        assert!(refuse(RecognitionOptions { beta2: 1.0, ..options() }).contains("beta2 is 1"));
-    }
-}
+mod tests;

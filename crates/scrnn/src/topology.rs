@@ -8,6 +8,8 @@ use crate::error::{Error, Result};
 
 /// Context units that share a time constant and a place in the hierarchy.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct Group {
     /// The group's name, e.g. `fast`.
     pub name: String,
@@ -16,11 +18,19 @@ pub struct Group {
     /// Time constant tau in steps, at least 1.
     pub time_constant: f64,
     /// Whether the input projects to the group.
+    #[cfg_attr(feature = "serde", serde(default = "yes"))]
     pub receives_input: bool,
     /// Whether the group projects to the mean and variance units.
+    #[cfg_attr(feature = "serde", serde(default = "yes"))]
     pub drives_output: bool,
     /// Whether the group's initial state is learned for each sequence; otherwise it starts from 0.
+    #[cfg_attr(feature = "serde", serde(default = "yes"))]
     pub learns_initial_state: bool,
+}
+
+#[cfg(feature = "serde")]
+fn yes() -> bool {
+    true
 }
 
 impl Group {

@@ -15,7 +15,7 @@ const SEGMENT_BYTES: usize = 448 << 10;
 const SEGMENT_ROWS: usize = 64;
 
 /// How the steps of a block are cut.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Cut {
     /// Products: steps + 1, see [`crate::packed`].
     pub products: usize,
@@ -67,7 +67,8 @@ pub(crate) struct Trajectory {
     pub variance: AVec<f64>,
     /// [product - segment start + 1][column][delta_stride].
     pub deltas: AVec<f64>,
-    /// Scratch of one segment: terms of ln L, squared errors, precisions.
+    /// Of one segment: targets, terms of ln L, squared errors, precisions; [step][column][channel].
+    pub targets: AVec<f64>,
     pub terms: AVec<f64>,
     pub squares: AVec<f64>,
     pub precisions: AVec<f64>,
@@ -84,6 +85,7 @@ impl Trajectory {
             mean: empty(),
             variance: empty(),
             deltas: empty(),
+            targets: empty(),
             terms: empty(),
             squares: empty(),
             precisions: empty(),
@@ -108,7 +110,7 @@ impl Trajectory {
         grow(&mut self.mean, block.steps() * n * packed.n_x);
         grow(&mut self.variance, block.steps() * n * channels);
         grow(&mut self.deltas, ((cut.segment + 1) * n + 1) * packed.delta_stride);
-        for scratch in [&mut self.terms, &mut self.squares, &mut self.precisions] {
+        for scratch in [&mut self.targets, &mut self.terms, &mut self.squares, &mut self.precisions] {
             grow(scratch, cut.segment * n * packed.n_x);
         }
     }

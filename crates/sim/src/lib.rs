@@ -1,29 +1,36 @@
 //! The robots of the thesis' experiments in a simulated world, and networks that move them.
 //!
+//! | module | what it holds | stands on |
+//! |---|---|---|
+//! | [`robot`] | a robot from its URDF: links, joints, kinematics, cameras, gaze; NAO | |
+//! | [`world`] | robots and things, moved by rapier; contacts; what there is to see | `robot` |
+//! | [`recording`] | what happened, as an MCAP file | `world` |
+//! | [`reach`] | NAO learns to touch a sphere (thesis 4.2) | all of them |
+//! | [`interact`] | two NAOs, one follows the other (thesis 5.2) | all of them |
+//!
 //! A [`robot::Robot`] is read from a description and set into a [`world::World`], which moves it by rapier's physics.
 //! Everything public is in nalgebra's types, metres, radians, seconds and newtons. Nothing here opens a file, prints, or
 //! reads a clock, and the same calls in the same order give the same bits.
 
-pub mod agent;
-pub mod camera;
-pub mod channels;
 pub mod error;
-pub mod follower;
-pub mod gaze;
-pub mod interaction;
-pub mod joints;
-pub mod kinematics;
-pub mod nao;
-pub mod parallel;
-pub mod reaching;
-pub mod reaching_recording;
+pub mod interact;
+pub mod reach;
 pub mod recording;
 pub mod robot;
-pub mod scene;
-pub mod touching;
-pub mod tutor;
 pub mod world;
 
-mod articulation;
-#[cfg(test)]
-mod description_tests;
+mod streams;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
+// The paths before the modules had folders, for callers that still use them.
+#[doc(hidden)]
+pub use interact::{self as film, self as follower, self as interaction};
+#[doc(hidden)]
+pub use reach::{agent, channels, recording as reaching_recording, stage as reaching, touching, tutor};
+#[doc(hidden)]
+pub use robot::{camera, gaze, joints, kinematics, nao};
+#[doc(hidden)]
+pub use world::scene;

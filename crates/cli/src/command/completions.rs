@@ -2,9 +2,9 @@
 
 use clap::{Args, CommandFactory};
 
-use crate::args::Cli;
-use crate::failure::{Ending, Result};
+use crate::cli::Cli;
 use crate::output;
+use scrnn_run::failure::{Ending, Result};
 
 /// Print a script that lets your shell complete commands and options
 #[derive(Debug, Args)]

@@ -4,16 +4,16 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use scrnn::tasks::Task;
+use scrnn_run::source;
 use scrnn_sim::reaching::PERIOD;
-use scrnn_sim::reaching_recording::{Look, ReachingRecording};
+use scrnn_sim::reaching_recording::{DemonstrationSample, ReachingRecording};
 use scrnn_sim::tutor::{self, Demonstration};
+use scrnn_tasks::{Task, TaskName, interact, make};
 
-use crate::args::Shared;
-use crate::experiment::TaskName;
-use crate::failure::{Ending, Failure, Result};
+use crate::args::{self, Shared};
+use crate::output;
 use scrnn_data::{self as files, Field};
-use crate::{interactions, output, source};
+use scrnn_run::failure::{Ending, Failure, Result};
 
 /// Write the sequences of the thesis' experiments
 ///
@@ -32,6 +32,7 @@ Examples:
   scrnn data interact --sequences 1 --out world.mcap     a recording to watch")]
 pub struct Arguments {
     /// Which sequences
+    #[arg(value_parser = args::task_names())]
     task: TaskName,
     /// Seed of the noise
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -65,7 +66,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     match (arguments.task, film) {
         (TaskName::Reach, _) => return reach(arguments, size, shared),
         (TaskName::Interact, Some(path)) => {
-            interactions::film(path, size, arguments.seed)?;
+            files::replace(path, &interact::film(size, arguments.seed)?)?;
             return Ok(Ending::Done);
         }
         (task, Some(path)) => {
@@ -74,7 +75,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         }
         (_, None) => {}
     }
-    let Task { data, means, variances } = source::make(arguments.task, size, arguments.seed)?;
+    let Task { data, means, variances } = make(arguments.task, size, arguments.seed, shared.engine()?.threads())?;
     let samples = [Field { name: "", data: &data }];
     match &arguments.out {
         Some(path) => files::write(path, &samples)?,
@@ -95,7 +96,7 @@ fn reach(arguments: &Arguments, size: (usize, usize), shared: &Shared) -> Result
     let tutoring = source::tutoring(size, arguments.exact_positions);
     let threads = shared.engine()?.threads();
     if let Some(path) = arguments.out.as_deref().filter(|path| is_recording(path)) {
-        let all = tutor::demonstrate_and_look(&tutoring, arguments.seed, threads, &Look::at)?;
+        let all = tutor::demonstrate_with(&tutoring, arguments.seed, threads, &DemonstrationSample::at)?;
         let seed = arguments.seed.to_string();
         files::replace(path, &recording(&all, &seed)?)?;
         return Ok(Ending::Done);
@@ -110,7 +111,7 @@ fn reach(arguments: &Arguments, size: (usize, usize), shared: &Shared) -> Result
 }
 
 /// All demonstrations one after the other, a second apart.
-fn recording(all: &[(Demonstration, Vec<Look>)], seed: &str) -> Result<Vec<u8>> {
+fn recording(all: &[(Demonstration, Vec<DemonstrationSample>)], seed: &str) -> Result<Vec<u8>> {
     let names = tutor::dataset(&all.iter().map(|(one, _)| one.clone()).collect::<Vec<_>>())?;
     let notes = [("task", "reach"), ("seed", seed)];
     let mut recording = ReachingRecording::new(Cursor::new(Vec::new()), None, &notes)?;
@@ -118,7 +119,7 @@ fn recording(all: &[(Demonstration, Vec<Look>)], seed: &str) -> Result<Vec<u8>> 
     for ((_, looks), sequence) in all.iter().zip(names.sequences()) {
         recording.begin_sequence(begin, &sequence.name)?;
         for look in looks {
-            recording.look(look)?;
+            recording.demonstration(look)?;
         }
         begin += looks.len() as f64 * PERIOD + 1.0;
     }

@@ -8,11 +8,12 @@ use scrnn::dataset::{Dataset, Sequence};
 use serde_json::{Value, json};
 
 use crate::args::{Part, Shared};
-use crate::failure::{Ending, Result};
-use crate::notes::Score;
-use crate::table::Table;
-use crate::trained::Trained;
-use crate::{files, output};
+use crate::output;
+use scrnn_data as files;
+use scrnn_report::Table;
+use scrnn_run::failure::{Ending, Result};
+use scrnn_run::notes::Score;
+use scrnn_run::trained::Trained;
 
 /// Show what is in a run folder, a checkpoint or a data file
 #[derive(Debug, Args)]

@@ -1,8 +1,8 @@
 //! `scrnn schema`: the JSON schema of the experiment file.
 
-use crate::experiment::Experiment;
-use crate::failure::{Ending, Result};
 use crate::output;
+use scrnn_run::experiment::Experiment;
+use scrnn_run::failure::{Ending, Result};
 
 /// Prints the schema.
 pub fn run() -> Result<Ending> {

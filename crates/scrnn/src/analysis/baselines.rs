@@ -4,7 +4,7 @@
 //! All predict the samples that a network of delay xi predicts, those from index xi on, with a Gaussian of constant
 //! variance for each channel. The nll of such a model is the entropy of a Gaussian with its mean squared error.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use crate::dataset::{Dataset, Sequence};
 use crate::evaluation::gaussian_entropy;
@@ -45,8 +45,20 @@ pub fn last_value(data: &Dataset, delay: usize) -> Option<f64> {
     })
 }
 
+/// Singular values of the standardised regressors below this share of the largest are rounding, and count as 0.
+const RELATIVE_CUT: f64 = 1e-12;
+/// Rows that are factored at a time: bounds the memory, whatever the number of samples.
+const ROWS: usize = 1024;
+
 /// Linear regression on the newest `order` samples of all channels that are known, and a constant; one for all sequences.
 /// None if there are fewer samples than coefficients.
+///
+/// ```text
+/// [X Y] = Q [R_x R_y; 0 S],   R_x w = R_y in the least squares        X: standardised regressors, Y: standardised targets
+/// ```
+///
+/// By orthogonal factors of the regressors themselves, in each channel's own unit: neither their units nor regressors that are
+/// nearly the same spoil it, as they would in normal equations.
 #[must_use]
 pub fn autoregression(data: &Dataset, delay: usize, order: usize) -> Option<f64> {
     let n = data.channels().len();
@@ -57,26 +69,42 @@ pub fn autoregression(data: &Dataset, delay: usize, order: usize) -> Option<f64>
     if places.len() <= width {
         return None;
     }
-    let regressors = |(sequence, k): (&Sequence, usize)| {
-        let lags = (0..order).flat_map(move |lag| sequence.sample(k - delay - lag).iter().copied());
-        DVector::from_iterator(width, lags.chain([1.0]))
+    let units: Vec<(f64, f64)> = (0..n).map(|i| unit(data, i)).collect::<Option<_>>()?;
+    // A row of [X Y].
+    let row = |(sequence, k): (&Sequence, usize)| -> Vec<f64> {
+        let standard =
+            |k: usize| sequence.sample(k).iter().zip(&units).map(|(value, (start, length))| (value - start) / length);
+        (0..order).flat_map(|lag| standard(k - delay - lag)).chain([1.0]).chain(standard(k)).collect()
     };
-    // Normal equations: A w = b with A = sum x x', b = sum x y.
-    let (mut a, mut b) = (DMatrix::zeros(width, width), DMatrix::zeros(width, n));
-    for &place in &places {
-        let x = regressors(place);
-        a.ger(1.0, &x, &x, 1.0);
-        b.ger(1.0, &x, &DVector::from_column_slice(place.0.sample(place.1)), 1.0);
+    // The triangle of all rows so far, above the next ones, makes the triangle of both.
+    let mut triangle = DMatrix::zeros(0, width + n);
+    for places in places.chunks(ROWS) {
+        let above = triangle.nrows();
+        let mut stacked = triangle.resize_vertically(above + places.len(), 0.0);
+        for (k, &place) in places.iter().enumerate() {
+            stacked.row_mut(above + k).iter_mut().zip(row(place)).for_each(|(to, value)| *to = value);
+        }
+        triangle = stacked.qr().r();
     }
-    let weights = a.svd(true, true).solve(&b, 1e-12).ok()?;
+    let (x, y) = (triangle.view((0, 0), (width, width)).into_owned(), triangle.view((0, width), (width, n)));
+    let factors = x.svd(true, true);
+    let weights = factors.solve(&y, RELATIVE_CUT * factors.singular_values.max()).ok()?;
     let mut squares = vec![0.0; n];
     for &place in &places {
-        let predicted = weights.tr_mul(&regressors(place));
-        for (i, square) in squares.iter_mut().enumerate() {
-            *square += (place.0.sample(place.1)[i] - predicted[i]).powi(2) / places.len() as f64;
+        let row = row(place);
+        for ((square, weights), target) in squares.iter_mut().zip(weights.column_iter()).zip(&row[width..]) {
+            let predicted: f64 = row.iter().zip(weights.iter()).map(|(x, w)| x * w).sum();
+            *square += (target - predicted).powi(2) / places.len() as f64;
         }
     }
-    of_errors(n, |i| Some(squares[i]))
+    of_errors(n, |i| Some(squares[i] * units[i].1.powi(2)))
+}
+
+/// Mean and standard deviation of channel `i`, or 1 where it never changes: where it begins, and how long its unit is.
+fn unit(data: &Dataset, i: usize) -> Option<(f64, f64)> {
+    let values: Vec<f64> = data.sequences().iter().flat_map(|sequence| from(sequence, 0, i)).collect();
+    let deviation = mean_square_about_mean(&values)?.sqrt();
+    Some((mean(&values)?, if deviation > 0.0 { deviation } else { 1.0 }))
 }
 
 /// Samples of channel `i` that are predicted.
@@ -138,5 +166,48 @@ mod tests {
         assert!((one - gaussian_entropy(0.5 * (1.0 - 1.0_f64.cos().powi(2)))).abs() < 0.01, "{one}");
         assert!(one < constant(&data, 1).unwrap());
         assert_eq!(autoregression(&set(&[&[1.0, 2.0, 3.0]]), 1, 4), None);
+    }
+
+    /// Two channels of which one is a smooth wave, and the other follows it with noise, each in a unit of its own.
+    fn two_channels(units: [f64; 2], offsets: [f64; 2]) -> Dataset {
+        let noise = |k: usize| (0.7 * (k * k) as f64).sin() + (1.3 * (k * k * k % 1009) as f64).sin();
+        let wave = |k: usize| (0.05 * k as f64).sin() + 1e-4 * noise(k);
+        let rows = |k: usize| [wave(k), 0.5 * wave(k.saturating_sub(2)) + 0.1 * noise(k + 7)];
+        let values = (0..3000).flat_map(|k| {
+            let row = rows(k);
+            [0, 1].map(|i| offsets[i] + units[i] * row[i])
+        });
+        let sequences = vec![Sequence::new("", 2, values.collect()).unwrap()];
+        Dataset::new(Dataset::numbered_channels(2), sequences).unwrap()
+    }
+
+    #[test]
+    fn an_autoregression_does_not_depend_on_units() {
+        let plain = autoregression(&two_channels([1.0, 1.0], [0.0, 0.0]), 1, 4).unwrap();
+        for (units, offsets, accuracy) in [
+            ([1e6, 1e6], [0.0, 0.0], 1e-9),
+            ([1e-6, 1e-6], [0.0, 0.0], 1e-9),
+            ([1e6, 1e-6], [0.0, 0.0], 1e-9),
+            ([1e-6, 1e6], [0.0, 0.0], 1e-9),
+            // What is left of the samples' digits beside an offset.
+            ([1.0, 1e-6], [1e3, 1e-3], 1e-6),
+        ] {
+            let shift = units.iter().map(|unit: &f64| unit.ln()).sum::<f64>() / 2.0;
+            let found = autoregression(&two_channels(units, offsets), 1, 4).unwrap() - shift;
+            assert!((found - plain).abs() < accuracy, "{units:?}, {offsets:?}: {found} and {plain}");
+        }
+    }
+
+    #[test]
+    fn a_channel_that_is_there_twice_in_two_units_is_predicted_as_well_as_once() {
+        let both = two_channels([1.0, 1.0], [0.0, 0.0]);
+        let of = |units: &[f64]| {
+            let values = both.sequences()[0].values().chunks(2).flat_map(|row| units.iter().map(|unit| unit * row[0]));
+            let sequence = Sequence::new("", units.len(), values.collect()).unwrap();
+            autoregression(&Dataset::new(Dataset::numbered_channels(units.len()), vec![sequence]).unwrap(), 1, 3)
+                .unwrap()
+        };
+        let (once, twice) = (of(&[1.0]), of(&[1.0, 1e6]));
+        assert!((twice - 0.5 * 1e6_f64.ln() - once).abs() < 1e-9, "{twice} and {once}");
     }
 }

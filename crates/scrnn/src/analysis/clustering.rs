@@ -6,11 +6,11 @@
 //! s = (b - a) / max(a, b)           from -1 to 1; the silhouette is its mean over points
 //! ```
 
-use rand::rngs::ChaCha8Rng;
-use rand::{RngExt, SeedableRng};
+use rand::RngExt;
 use serde::Serialize;
 
 use crate::evaluation::mean_and_deviation;
+use crate::streams::{Purpose, stream};
 
 /// A silhouette beside those of shuffled labels.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -44,7 +44,7 @@ pub fn against_chance(
 ) -> Option<Clustering> {
     let distances = distances(points, dimensions);
     let silhouette = of_distances(&distances, labels)?;
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut random = stream(seed, Purpose::PermutationTest, 0);
     let mut shuffled = labels.to_vec();
     let mut values = Vec::with_capacity(shuffles);
     for _ in 0..shuffles {

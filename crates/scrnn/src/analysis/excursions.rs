@@ -2,7 +2,7 @@
 //! an arm between its primitives (thesis 5.3.1), is read by events: it begins when the signal is well out, and ends when it is
 //! nearly back. Timing may drift, and noise around either threshold does not count twice.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Where the signal rests and how far it goes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,7 +21,7 @@ pub const BEGINS: f64 = 0.6;
 pub const ENDS: f64 = 0.25;
 
 /// One of two sides.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Side {
     /// L.
     #[serde(rename = "L")]

@@ -11,10 +11,10 @@
 //! ```
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
-use rand::rngs::ChaCha8Rng;
-use rand::{RngExt, SeedableRng};
+use rand::RngExt;
 
 use crate::error::{Error, Result};
+use crate::streams::{Purpose, stream};
 
 /// How to fit a mixture.
 #[derive(Debug, Clone, PartialEq)]
@@ -259,7 +259,7 @@ fn floor(points: &[DVector<f64>], regularisation: f64) -> DVector<f64> {
 fn nearest_centres(points: &[DVector<f64>], options: &MixtureOptions) -> DMatrix<f64> {
     let scale = floor(points, 1.0);
     let distance = |a: &DVector<f64>, b: &DVector<f64>| (a - b).map(|off| off * off).component_div(&scale).sum();
-    let mut generator = ChaCha8Rng::seed_from_u64(options.seed);
+    let mut generator = stream(options.seed, Purpose::MixtureCentres, 0);
     let mut nearest = vec![(f64::INFINITY, 0); points.len()];
     for k in 0..options.components {
         let total: f64 = nearest.iter().map(|(distance, _)| distance).sum();
@@ -311,6 +311,8 @@ fn ln_sum(terms: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::SeedableRng;
+    use rand::rngs::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
 
     fn normal(generator: &mut ChaCha8Rng) -> f64 {

@@ -3,12 +3,12 @@
 //! A cycle lasts from one upward crossing of a level to the next. A crossing counts only after the signal was well below
 //! the level, so that noise around it does not count twice.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::evaluation::mean_and_deviation;
 
 /// Amplitude and period over all cycles.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Oscillation {
     /// Number of whole cycles.
     pub cycles: usize,

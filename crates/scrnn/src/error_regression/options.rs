@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 
 /// How the internal state is moved; every sample starts from rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Ascent {
     /// Gradient ascent with momentum, as in the thesis.
     Momentum {
@@ -19,8 +20,20 @@ pub enum Ascent {
     },
 }
 
+impl Ascent {
+    /// The same rule at another rate.
+    #[must_use]
+    pub fn with_rate(self, rate: f64) -> Self {
+        match self {
+            Self::Momentum { momentum, .. } => Self::Momentum { rate, momentum },
+            Self::Adam { .. } => Self::Adam { rate },
+        }
+    }
+}
+
 /// How to regress.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct ErrorRegressionOptions {
     /// W, in steps.
     pub window: usize,
@@ -36,12 +49,20 @@ pub struct ErrorRegressionOptions {
     pub sensed_in_window: Vec<f64>,
     /// Share of each channel's errors in ln L_reg: 0 does not heed a channel, e.g. that of a joint which the network moves
     /// itself, and which therefore always is where it was predicted.
-    pub heeded: Vec<f64>,
+    pub mask: Vec<f64>,
     /// Samples to predict beyond the next one.
     pub ahead: usize,
 }
 
 impl ErrorRegressionOptions {
+    /// The defaults on so many channels with some of them changed.
+    #[must_use]
+    pub fn with(channels: usize, change: impl FnOnce(&mut Self)) -> Self {
+        let mut options = Self::new(channels);
+        change(&mut options);
+        options
+    }
+
     /// A window of 50 steps and 10 iterations of Adam, which suits most networks; every channel senses, and the window
     /// runs in the closed loop.
     #[must_use]
@@ -53,7 +74,7 @@ impl ErrorRegressionOptions {
             max_norm: None,
             sensed: vec![1.0; channels],
             sensed_in_window: vec![0.0; channels],
-            heeded: vec![1.0; channels],
+            mask: vec![1.0; channels],
             ahead: 0,
         }
     }
@@ -82,7 +103,7 @@ impl ErrorRegressionOptions {
         for (what, shares) in [
             ("the sensed shares", &self.sensed),
             ("the window's shares", &self.sensed_in_window),
-            ("the heeded shares", &self.heeded),
+            ("the mask", &self.mask),
         ] {
             if shares.len() != channels {
                 return Err(Error::Length { what: what.to_owned(), found: shares.len(), needed: channels });

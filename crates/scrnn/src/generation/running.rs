@@ -1,15 +1,15 @@
 //! One network beside a world that moves on: it takes in a sample and predicts, step by step.
 
 use pulp::{Simd, WithSimd};
-use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 
-use super::{DOMAIN, Feedback, check, draw, input};
-use crate::engine::{InstructionSet, Run};
+use super::{Feedback, check, draw, input};
+use crate::engine::{Engine, InstructionSet, Run};
 use crate::error::{Error, Result};
 use crate::network::Network;
 use crate::packed::Packed;
 use crate::stepper::Stepper;
+use crate::streams::{Purpose, stream};
 
 /// A network that generates while its samples are still to come. Stepped through recorded samples it gives the bits of
 /// [`generate`](super::generate) with one start.
@@ -41,7 +41,7 @@ impl Running {
         initial_state: &[f64],
         feedback: Feedback,
         seed: u64,
-        set: InstructionSet,
+        engine: &Engine,
     ) -> Result<Self> {
         let topology = &network.topology;
         let (n_x, n_c, delay) = (topology.channels(), topology.context_units(), topology.delay());
@@ -50,6 +50,7 @@ impl Running {
             let what = "the initial state".to_owned();
             return Err(Error::Length { what, found: initial_state.len(), needed: n_c });
         }
+        let set = engine.instruction_set();
         let mut packed = Packed::new(topology, set);
         packed.fill(&network.parameters);
         let mut stepper = Stepper::new(&packed, 1);
@@ -61,7 +62,7 @@ impl Running {
             stepper,
             set,
             feedback,
-            random: ChaCha8Rng::seed_from_u64(seed ^ DOMAIN),
+            random: stream(seed, Purpose::Generation, 0),
             delay,
             floor: topology.variance_floor(),
             has_variance,
@@ -199,7 +200,7 @@ mod tests {
             let start = Start { initial_state: &U0, sensed: &sensed };
             let options = GenerationOptions { steps: 40, feedback: feedback.clone(), seed: 9, contexts: true };
             let whole = generate(&network, &[start], &options, &Engine::new(1, set).unwrap()).unwrap();
-            let mut running = Running::new(&network, &U0, feedback, 9, set).unwrap();
+            let mut running = Running::new(&network, &U0, feedback, 9, &Engine::new(1, set).unwrap()).unwrap();
             for (k, sample) in sensed.chunks_exact(2).enumerate() {
                 if k >= delay {
                     assert_eq!(
@@ -221,7 +222,7 @@ mod tests {
     #[test]
     fn wrong_sizes_are_refused_and_change_nothing() {
         let network = network(1, 0.0);
-        let new = |state: &[f64], feedback| Running::new(&network, state, feedback, 1, InstructionSet::best());
+        let new = |state: &[f64], feedback| Running::new(&network, state, feedback, 1, &Engine::serial());
         assert!(new(&U0[1..], Feedback::open(2)).unwrap_err().to_string().contains("12 values; needed: 13"));
         assert!(new(&U0, Feedback::open(3)).unwrap_err().to_string().contains("3 values; needed: 2"));
         let mut running = new(&U0, Feedback::open(2)).unwrap();

@@ -4,7 +4,7 @@
 //! gradient[k, row] += sum_n delta[n, row] * state[n, k]
 //! ```
 //!
-//! n runs over (step, column) in memory order. Tiles of a few vectors of rows and six k stay in registers while n runs.
+//! n runs over (step, column) in memory order; of columns that have ended, rows are left out. Tiles of a few vectors of rows and six k stay in registers while n runs.
 
 #![allow(clippy::needless_range_loop, reason = "loops over the constant sides of a tile unroll; indices say which")]
 
@@ -21,25 +21,43 @@ pub struct Rows<'a> {
     pub stride: usize,
 }
 
-/// Accumulates `count` outer products. `gradient` holds one row of `rows` values (a multiple of [`ROWS`]) for each k in
+/// Which rows are taken up: the first `width` of every `period`, `groups` times.
+#[derive(Debug, Clone, Copy)]
+pub struct Taken {
+    /// How many groups.
+    pub groups: usize,
+    /// Rows of a group that are taken.
+    pub width: usize,
+    /// All rows of a group.
+    pub period: usize,
+}
+
+impl From<usize> for Taken {
+    /// The first `count` rows.
+    fn from(count: usize) -> Self {
+        Self { groups: 1, width: count, period: count }
+    }
+}
+
+/// Accumulates the outer products of the rows `taken`, in their order. `gradient` holds one row of `rows` values (a multiple of [`ROWS`]) for each k in
 /// `from..to`, in that order.
 #[inline(always)]
 pub fn accumulate<S: Simd>(
     simd: S,
     delta: Rows<'_>,
     state: Rows<'_>,
-    count: usize,
+    taken: impl Into<Taken>,
     rows: usize,
     (from, to): (usize, usize),
     gradient: &mut [f64],
 ) {
     debug_assert!(rows.is_multiple_of(ROWS) && gradient.len() >= (to - from) * rows);
-    let vectors = rows / S::F64_LANES;
+    let (vectors, taken) = (rows / S::F64_LANES, taken.into());
     let bands = vectors.div_ceil(tallest::<S>()).max(1);
     let mut first = 0;
     for band in 0..bands {
         let height = vectors / bands + usize::from(band < vectors % bands);
-        let job = Job { delta, state, count, rows, row: first * S::F64_LANES, from, to };
+        let job = Job { delta, state, taken, rows, row: first * S::F64_LANES, from, to };
         match height {
             4 => tiles::<S, 4>(simd, &job, gradient),
             3 => tiles::<S, 3>(simd, &job, gradient),
@@ -55,7 +73,7 @@ pub fn accumulate<S: Simd>(
 struct Job<'a> {
     delta: Rows<'a>,
     state: Rows<'a>,
-    count: usize,
+    taken: Taken,
     rows: usize,
     row: usize,
     from: usize,
@@ -113,15 +131,19 @@ impl<const M: usize, const N: usize> WithSimd for Tile<'_, M, N> {
             }
         }
         let (height, k) = (M * lanes, job.from + first);
-        let deltas = &job.delta.values[job.row..][..job.count * job.delta.stride];
-        let states = &job.state.values[k..][..job.count * job.state.stride];
-        for (delta, state) in deltas.chunks_exact(job.delta.stride).zip(states.chunks_exact(job.state.stride)) {
-            let (delta, _) = S::as_simd_f64s(&delta[..height]);
-            let state = &state[..N];
-            for n in 0..N {
-                let x = simd.splat_f64s(state[n]);
-                for m in 0..M {
-                    sums[m][n] = simd.mul_add_f64s(delta[m], x, sums[m][n]);
+        let Taken { groups, width, period } = job.taken;
+        for group in 0..groups {
+            let first = group * period;
+            let deltas = &job.delta.values[first * job.delta.stride + job.row..][..width * job.delta.stride];
+            let states = &job.state.values[first * job.state.stride + k..][..width * job.state.stride];
+            for (delta, state) in deltas.chunks_exact(job.delta.stride).zip(states.chunks_exact(job.state.stride)) {
+                let (delta, _) = S::as_simd_f64s(&delta[..height]);
+                let state = &state[..N];
+                for n in 0..N {
+                    let x = simd.splat_f64s(state[n]);
+                    for m in 0..M {
+                        sums[m][n] = simd.mul_add_f64s(delta[m], x, sums[m][n]);
+                    }
                 }
             }
         }

@@ -28,7 +28,7 @@ pub fn accumulate(delta: &[f64], rows: usize, state: &[f64], inner: usize) -> Ve
 
 #[cfg(test)]
 mod tests {
-    use super::super::outer::{self, Rows};
+    use super::super::outer::{self, Rows, Taken};
     use super::super::panels::{self, Columns, Panels, Product};
     use super::super::{padded, stride};
     use crate::engine::{InstructionSet, Run};
@@ -54,7 +54,7 @@ mod tests {
         }
     }
 
-    struct Accumulate<'a>(Rows<'a>, Rows<'a>, usize, usize, (usize, usize), &'a mut [f64]);
+    struct Accumulate<'a>(Rows<'a>, Rows<'a>, Taken, usize, (usize, usize), &'a mut [f64]);
 
     impl WithSimd for Accumulate<'_> {
         type Output = ();
@@ -127,9 +127,31 @@ mod tests {
                 let mut out = vec![0.0; inner * rows_padded];
                 let delta = Rows { values: &delta, stride: ds };
                 let state = Rows { values: &state, stride: zs };
-                set.run(Accumulate(delta, state, count, rows_padded, (0, inner), &mut out));
+                set.run(Accumulate(delta, state, count.into(), rows_padded, (0, inner), &mut out));
                 let fast: Vec<f64> = (0..rows * inner).map(|i| out[i % inner * rows_padded + i / inner]).collect();
                 prop_assert!(close(&fast, &plain, count), "{set} {rows}x{inner}x{count}");
+            }
+        }
+    }
+
+    #[test]
+    fn rows_that_are_left_out_change_no_bit_of_a_gradient() {
+        let (rows, inner, groups, period) = (40, 23, 7, 6);
+        let (ds, zs) = (stride(rows), stride(inner));
+        let (delta, state) = (values((groups * period + 1) * ds, 5), values((groups * period + 1) * zs, 6));
+        for set in InstructionSet::available() {
+            let gradient = |first: usize, taken: Taken, out: &mut [f64]| {
+                let delta = Rows { values: &delta[first * ds..], stride: ds };
+                let state = Rows { values: &state[first * zs..], stride: zs };
+                set.run(Accumulate(delta, state, taken, rows, (0, inner), out));
+            };
+            for width in 0..=period {
+                let (mut at_once, mut one_by_one) = (vec![0.0; inner * rows], vec![0.0; inner * rows]);
+                gradient(0, Taken { groups, width, period }, &mut at_once);
+                for group in 0..groups {
+                    gradient(group * period, width.into(), &mut one_by_one);
+                }
+                assert!(at_once == one_by_one, "{set}: {width} of {period}");
             }
         }
     }

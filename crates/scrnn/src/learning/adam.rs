@@ -6,15 +6,17 @@
 //! ```
 //!
 //! before which weights w <- (1 - rate(n) decay) w if decay is above 0 (decoupled weight decay, Loshchilov and Hutter 2019).
-//! Initial states move in [`Coordinates`] that are not stiff, however narrow the prior.
+//! Initial states move in [`NonCentred`] form that are not stiff, however narrow the prior. Between the first update of an epoch and
+//! the last, z is what is kept, and u_0 follows it and the mean where a batch asks for it: so an update costs what its batch costs.
 
 use std::ops::Range;
 
-use super::coordinates::Coordinates;
+use super::non_centred::NonCentred;
 use super::plan::Adam;
 use super::state::Fields;
 use crate::initial_states::InitialStates;
-use crate::parameters::{Block, Gradients, Parameters};
+use crate::objective::{Evaluation, Run};
+use crate::parameters::{Block, Parameters};
 use crate::topology::Topology;
 
 /// First and second moments of one list of parameters.
@@ -62,7 +64,7 @@ pub(super) struct Batch<'a> {
     pub epoch: u64,
     /// The number of this update, from 1.
     pub update: u64,
-    pub sequences: &'a [usize],
+    pub runs: &'a [Run],
     /// Their steps times the channels.
     pub terms: f64,
 }
@@ -79,7 +81,7 @@ pub(super) struct AdamRule {
     epochs: u64,
     /// The average of T N_O over sequences.
     terms: f64,
-    coordinates: Coordinates,
+    non_centred: NonCentred,
     scratch: Vec<f64>,
     z: Vec<f64>,
 }
@@ -103,7 +105,7 @@ impl AdamRule {
             mean: Moments::new(states.mean().len()),
             epochs,
             terms: terms / states.sequences() as f64,
-            coordinates: Coordinates::new(topology, variance),
+            non_centred: NonCentred::new(topology, variance),
             scratch: vec![0.0; parameters.max(states.values().len())],
             z: vec![0.0; states.values().len()],
         }
@@ -132,15 +134,34 @@ impl AdamRule {
         (rate, rate * self.options.initial_state_factor)
     }
 
-    /// One update from the gradients of ln L_out over a batch of sequences. Initial states of others stay as they are.
+    /// Takes z up, before the first update of an epoch.
+    pub fn begin_epoch(&mut self, states: &InitialStates) {
+        self.non_centred.read(states, &mut self.z);
+    }
+
+    /// Brings u_0 of a batch to where z and the mean are.
+    pub fn place(&self, runs: &[Run], states: &mut InitialStates) {
+        let units = states.mean().len();
+        for run in runs {
+            let z = &self.z[run.sequence * units..(run.sequence + 1) * units];
+            self.non_centred.write_one(z, run.sequence, states);
+        }
+    }
+
+    /// Brings u_0 of all sequences there, after the last update of an epoch.
+    pub fn end_epoch(&self, states: &mut InitialStates) {
+        self.non_centred.write(&self.z, states);
+    }
+
+    /// One update of weights, mean, and z of a batch, from the gradients of ln L_out over its sequences.
     pub fn ascend(
         &mut self,
         batch: &Batch<'_>,
-        gradients: &Gradients,
-        initial: &[f64],
+        evaluation: &Evaluation,
         parameters: &mut Parameters,
         states: &mut InitialStates,
     ) {
+        let Evaluation { gradients, initial, .. } = evaluation;
         let adam = self.options.clone();
         let rate = self.rate(batch.epoch);
 
@@ -161,13 +182,12 @@ impl AdamRule {
         let units = states.mean().len();
         // Each sequence is met once an epoch.
         let (met, own_rate) = (batch.epoch + 1, rate * adam.initial_state_factor);
-        self.coordinates.read(states, &mut self.z);
-        for (&sequence, initial) in batch.sequences.iter().zip(initial.chunks_exact(units)) {
-            let own = sequence * units..(sequence + 1) * units;
+        for (run, initial) in batch.runs.iter().zip(initial.chunks_exact(units)) {
+            let own = run.sequence * units..(run.sequence + 1) * units;
             let z = &mut self.z[own.clone()];
             let scratch = &mut self.scratch[..units];
             for (i, (out, g)) in scratch.iter_mut().zip(initial).enumerate() {
-                *out = self.coordinates.slope(i, *g, z[i]) / self.terms;
+                *out = self.non_centred.slope(i, *g, z[i]) / self.terms;
             }
             self.initial.ascend_range(own, &adam, met, own_rate, scratch, z);
         }
@@ -177,7 +197,6 @@ impl AdamRule {
             *out = initial.iter().skip(i).step_by(units).sum::<f64>() / batch.terms;
         }
         self.mean.ascend(&adam, batch.update, rate * adam.mean_factor, scratch, states.mean_mut());
-        self.coordinates.write(&self.z, states);
     }
 
     /// Takes over what another rule of the same training remembers; allocates nothing.
@@ -220,9 +239,10 @@ mod tests {
         let options = Adam { rate: 0.1, warm_up: 0.0, weight_decay: 0.2, ..Adam::default() };
         let mut rule = AdamRule::new(options, &topology, &states, 10, 1.0, 10);
         // Without a gradient nothing else moves.
-        let (gradients, initial) = (Parameters::zeros(&topology), [0.0; 3]);
-        let batch = Batch { epoch: 0, update: 1, sequences: &[0], terms: 20.0 };
-        rule.ascend(&batch, &gradients, &initial, &mut network.parameters, &mut states);
+        let mut evaluation = Evaluation::new(&topology);
+        evaluation.resize(1);
+        let batch = Batch { epoch: 0, update: 1, runs: &[Run::new(0, 10)], terms: 20.0 };
+        rule.ascend(&batch, &evaluation, &mut network.parameters, &mut states);
         for block in Block::ALL {
             let expected = if block.is_bias() { 0.5 } else { 0.5 * 0.98 };
             assert!(network.parameters.block(block).iter().all(|w| (w - expected).abs() < 1e-15), "{block:?}");
@@ -235,9 +255,12 @@ mod tests {
         let (mut network, mut states) = crate::initialization::initialize(&topology, 3, 5);
         let options = Adam { rate: 0.1, warm_up: 0.0, mean_factor: 0.0, ..Adam::default() };
         let mut rule = AdamRule::new(options, &topology, &states, 10, 1.0, 10);
-        let (gradients, before) = (Parameters::zeros(&topology), states.clone());
-        let batch = Batch { epoch: 0, update: 1, sequences: &[2, 0], terms: 20.0 };
-        rule.ascend(&batch, &gradients, &[1.0, 2.0, -1.0, 5.0], &mut network.parameters, &mut states);
+        let (mut evaluation, before) = (Evaluation::new(&topology), states.clone());
+        evaluation.initial = vec![1.0, 2.0, -1.0, 5.0];
+        let batch = Batch { epoch: 0, update: 1, runs: &[Run::new(2, 10), Run::new(0, 10)], terms: 20.0 };
+        rule.begin_epoch(&states);
+        rule.ascend(&batch, &evaluation, &mut network.parameters, &mut states);
+        rule.end_epoch(&mut states);
         let moved = |s: usize| [0, 1].map(|i| states.sequence(s)[i] - before.sequence(s)[i]);
         // The first step of Adam is as long as the rate, three times that of the weights, whatever the gradient.
         for (sequence, expected) in [(0, [-0.3, 0.3]), (1, [0.0, 0.0]), (2, [0.3, 0.3])] {

@@ -7,79 +7,112 @@
 //! its predecessors left, and what an epoch reports is the sum of that: values of parameters on their way. Only before the
 //! first update and after the last are all sequences evaluated at the same parameters.
 
-use rand::SeedableRng;
-use rand::rngs::ChaCha8Rng;
+use std::ops::Range;
+
 use rand::seq::SliceRandom;
 
 use super::adam::{self, AdamRule};
 use super::state::Fields;
-use crate::batch::Item;
-use crate::checkpoint::{OptimiserState, StateTensor};
-use crate::engine::Engine;
+use super::state::{OptimiserState, StateTensor};
 use crate::error::Result;
 use crate::initial_states::InitialStates;
-use crate::objective::{Objective, Want};
+use crate::objective::{Evaluation, Objective, Run, Want};
 use crate::parameters::{Gradients, Parameters};
+use crate::streams::{Purpose, stream};
 use crate::topology::Topology;
 
-/// Some of the sequences.
-#[derive(Debug)]
-struct Batch {
-    sequences: Vec<usize>,
-    objective: Objective,
-    /// Steps times channels.
-    terms: f64,
-}
-
-/// All sequences.
+/// All sequences. Batches are parts of one list: there is one objective, and room for the largest of them.
 #[derive(Debug)]
 pub(super) struct Batches {
-    batches: Vec<Batch>,
-    /// In which order this epoch takes them.
+    objective: Box<dyn Objective>,
+    /// What the last batch came to.
+    evaluation: Evaluation,
+    /// One run through each sequence, in their order.
+    runs: Vec<Run>,
+    /// The same in the order in which they are dealt: each batch is a part of it,
+    dealt: Vec<Run>,
+    /// from one end to the next.
+    ends: Vec<usize>,
+    /// In which order this epoch takes the batches.
     order: Vec<usize>,
-    /// u_0 of one batch, [sequence][unit].
+    /// u_0 of one batch, [run][unit].
     initial: Vec<f64>,
-    units: usize,
+    channels: usize,
+    /// The gradient of all batches together.
+    total: Vec<f64>,
     /// ln L_out of each sequence, as last evaluated.
     pub ln_likelihoods: Vec<f64>,
     squared_errors: Vec<f64>,
     /// Length of the last gradient in the shared parameters, per step and channel: of all, or of the last batch.
     pub gradient_norm: f64,
-    /// The batch whose gradient was not finite.
-    broken: Option<usize>,
+    /// A gradient that is not finite.
+    broken: Option<Gradients>,
 }
 
 const LN_LIKELIHOODS: &str = "batches.ln_likelihood";
 const SQUARED_ERRORS: &str = "batches.squared_error";
 const GRADIENT_NORM: &str = "batches.gradient_norm";
 
+/// Steps times channels.
+fn terms(runs: &[Run], channels: usize) -> f64 {
+    (runs.iter().map(|run| run.steps).sum::<usize>() * channels) as f64
+}
+
 impl Batches {
-    /// Deals the sequences into batches of `size` at most, none of which differs from another by more than one.
-    pub fn new(topology: &Topology, items: &[Item<'_>], size: usize, recompute: bool, engine: &Engine) -> Self {
-        let count = items.len().div_ceil(size.max(1)).max(1);
-        let mut dealt: Vec<usize> = (0..items.len()).collect();
-        if count > 1 {
-            dealt.shuffle(&mut ChaCha8Rng::seed_from_u64(0));
-        }
-        let batch = |index: usize| {
-            let mut sequences: Vec<usize> = dealt.iter().copied().skip(index).step_by(count).collect();
-            sequences.sort_unstable();
-            let own: Vec<Item<'_>> = sequences.iter().map(|&sequence| items[sequence]).collect();
-            let steps: usize = own.iter().map(|item| item.steps).sum();
-            let objective = Objective::new(topology, &own, recompute, engine);
-            Batch { sequences, objective, terms: (steps * topology.channels()) as f64 }
-        };
-        let units = topology.context_units();
-        Self {
-            batches: (0..count).map(batch).collect(),
-            order: (0..count).collect(),
-            initial: vec![0.0; items.len().div_ceil(count) * units],
-            units,
-            ln_likelihoods: vec![0.0; items.len()],
-            squared_errors: vec![0.0; items.len()],
+    /// Deals the sequences, through each of which there is a run, into batches of `size` at most, none of which differs from another
+    /// by more than one.
+    pub fn new(objective: Box<dyn Objective>, topology: &Topology, runs: Vec<Run>, size: usize) -> Self {
+        let count = runs.len();
+        let mut batches = Self {
+            objective,
+            evaluation: Evaluation::new(topology),
+            dealt: runs.clone(),
+            runs,
+            ends: Vec::new(),
+            order: Vec::new(),
+            initial: Vec::new(),
+            channels: topology.channels(),
+            total: Parameters::zeros(topology).as_slice().to_vec(),
+            ln_likelihoods: vec![0.0; count],
+            squared_errors: vec![0.0; count],
             gradient_norm: 0.0,
             broken: None,
+        };
+        batches.deal(size);
+        batches
+    }
+
+    /// Deals them anew.
+    pub fn deal(&mut self, size: usize) {
+        let sequences = self.runs.len();
+        let count = sequences.div_ceil(size.max(1)).max(1);
+        self.dealt.clone_from(&self.runs);
+        self.ends.clear();
+        self.ends.push(sequences);
+        if count > 1 {
+            let mut shuffled: Vec<usize> = (0..sequences).collect();
+            shuffled.shuffle(&mut stream(0, Purpose::BatchMembers, 0));
+            (self.dealt, self.ends) = (Vec::with_capacity(sequences), Vec::with_capacity(count));
+            for index in 0..count {
+                let start = self.dealt.len();
+                self.dealt.extend(shuffled.iter().skip(index).step_by(count).map(|&sequence| self.runs[sequence]));
+                self.dealt[start..].sort_unstable_by_key(|run| run.sequence);
+                self.ends.push(self.dealt.len());
+            }
         }
+        self.order.clear();
+        self.order.extend(0..count);
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Where batch `index` lies in the list of runs.
+    fn part(&self, index: usize) -> Range<usize> {
+        let start = index.checked_sub(1).map_or(0, |before| self.ends[before]);
+        start..self.ends[index]
     }
 
     /// ln L_out of all sequences, as last evaluated.
@@ -93,84 +126,97 @@ impl Batches {
     }
 
     /// The first sequence whose values are not finite.
-    pub fn sequence_without_numbers(&self) -> Option<usize> {
-        let finite = |s: &usize| self.ln_likelihoods[*s].is_finite() && self.squared_errors[*s].is_finite();
-        (0..self.ln_likelihoods.len()).find(|s| !finite(s))
+    pub fn non_finite_sequence(&self) -> Option<usize> {
+        (0..self.ln_likelihoods.len()).find(|&sequence| !self.has_numbers(sequence))
+    }
+
+    fn has_numbers(&self, sequence: usize) -> bool {
+        self.ln_likelihoods[sequence].is_finite() && self.squared_errors[sequence].is_finite()
     }
 
     /// The gradient that is not finite.
-    pub fn gradient_without_numbers(&self) -> Option<&Gradients> {
-        self.broken.map(|index| &self.batches[index].objective.gradients)
+    pub fn non_finite_gradient(&self) -> Option<&Gradients> {
+        self.broken.as_ref()
     }
 
     /// The gradients in shared parameters and in initial states, where all sequences are in one batch.
     pub fn gradient_of_all(&self) -> (&Gradients, &[f64]) {
-        assert!(self.batches.len() == 1, "only one batch has the gradient of all sequences");
-        (&self.batches[0].objective.gradients, &self.batches[0].objective.initial)
+        assert!(self.count() == 1, "only one batch has the gradient of all sequences");
+        (&self.evaluation.gradients, &self.evaluation.initial)
+    }
+
+    /// Names the arithmetic.
+    pub fn numerics(&self) -> &str {
+        self.objective.numerics()
     }
 
     /// Evaluates all sequences at the same parameters.
     pub fn evaluate(&mut self, parameters: &Parameters, states: &InitialStates) {
         self.broken = None;
-        for index in 0..self.batches.len() {
+        self.total.fill(0.0);
+        for index in 0..self.count() {
             self.evaluate_batch(index, parameters, states);
+            self.total.iter_mut().zip(self.evaluation.gradients.as_slice()).for_each(|(sum, g)| *sum += g);
         }
-        let terms: f64 = self.batches.iter().map(|batch| batch.terms).sum();
-        let of_all = |i: usize| self.batches.iter().map(|batch| batch.objective.gradients.as_slice()[i]).sum::<f64>();
-        let count = parameters.as_slice().len();
-        self.gradient_norm = (0..count).map(|i| of_all(i).powi(2)).sum::<f64>().sqrt() / terms;
+        self.gradient_norm = norm(&self.total) / terms(&self.runs, self.channels);
     }
 
     /// Makes an epoch's updates. Whether their values stand for the epoch that follows: where there is one batch, they are those
     /// of the epoch before.
     pub fn ascend(&mut self, rule: &mut AdamRule, epoch: u64, state: (&mut Parameters, &mut InitialStates)) -> bool {
         let (parameters, states) = state;
-        let count = self.batches.len();
+        let count = self.count();
         if count > 1 {
             self.order.sort_unstable();
-            self.order.shuffle(&mut ChaCha8Rng::seed_from_u64(epoch));
+            self.order.shuffle(&mut stream(0, Purpose::BatchOrder, epoch));
         }
+        rule.begin_epoch(states);
         for nth in 0..count {
             let index = self.order[nth];
             if count > 1 {
-                self.evaluate_batch(index, parameters, states);
-                if self.sequence_without_numbers().is_some() || self.broken.is_some() {
+                rule.place(&self.dealt[self.part(index)], states);
+                if !self.evaluate_batch(index, parameters, states) {
                     break;
                 }
             }
-            let Batch { sequences, objective, terms } = &self.batches[index];
+            let runs = &self.dealt[self.part(index)];
             let update = epoch * count as u64 + nth as u64 + 1;
-            let batch = adam::Batch { epoch, update, sequences, terms: *terms };
-            rule.ascend(&batch, &objective.gradients, &objective.initial, parameters, states);
+            let batch = adam::Batch { epoch, update, runs, terms: terms(runs, self.channels) };
+            rule.ascend(&batch, &self.evaluation, parameters, states);
         }
+        rule.end_epoch(states);
         if count > 1 {
-            let Batch { objective, terms, .. } = &self.batches[self.order[count - 1]];
-            self.gradient_norm = objective.gradients.as_slice().iter().map(|g| g * g).sum::<f64>().sqrt() / terms;
+            let runs = &self.dealt[self.part(self.order[count - 1])];
+            self.gradient_norm = norm(self.evaluation.gradients.as_slice()) / terms(runs, self.channels);
         }
         count > 1
     }
 
-    fn evaluate_batch(&mut self, index: usize, parameters: &Parameters, states: &InitialStates) {
-        let Batch { sequences, objective, .. } = &mut self.batches[index];
-        let initial = &mut self.initial[..sequences.len() * self.units];
-        for (&sequence, initial) in sequences.iter().zip(initial.chunks_exact_mut(self.units)) {
-            initial.copy_from_slice(states.sequence(sequence));
+    /// Whether all values are finite.
+    fn evaluate_batch(&mut self, index: usize, parameters: &Parameters, states: &InitialStates) -> bool {
+        let part = self.part(index);
+        let runs = &self.dealt[part.clone()];
+        self.initial.clear();
+        for run in runs {
+            self.initial.extend_from_slice(states.sequence(run.sequence));
         }
-        objective.set_parameters(parameters);
-        objective.evaluate(initial, Want::Everything);
-        for (own, &sequence) in sequences.iter().enumerate() {
-            self.ln_likelihoods[sequence] = objective.ln_likelihood[own];
-            self.squared_errors[sequence] = objective.squared_error[own];
+        self.objective.set_parameters(parameters);
+        self.objective.evaluate(runs, &self.initial, Want::Everything, &mut self.evaluation);
+        for (own, run) in runs.iter().enumerate() {
+            self.ln_likelihoods[run.sequence] = self.evaluation.ln_likelihood[own];
+            self.squared_errors[run.sequence] = self.evaluation.squared_error[own];
         }
-        let mut gradients = objective.gradients.as_slice().iter().chain(&objective.initial);
-        if !gradients.all(|g| g.is_finite()) {
-            self.broken = Some(index);
+        let Evaluation { gradients, initial, .. } = &self.evaluation;
+        let is_broken = !gradients.as_slice().iter().chain(initial).all(|g| g.is_finite());
+        if is_broken {
+            self.broken = Some(gradients.clone());
         }
+        !is_broken && self.dealt[part].iter().all(|run| self.has_numbers(run.sequence))
     }
 
     /// Adds what a report needs to an optimiser's state; nothing where one evaluation finds it again.
     pub fn save(&self, state: &mut OptimiserState) {
-        if self.batches.len() > 1 {
+        if self.count() > 1 {
             for (name, values) in [(LN_LIKELIHOODS, &self.ln_likelihoods), (SQUARED_ERRORS, &self.squared_errors)] {
                 let (shape, values) = (vec![values.len()], values.clone());
                 state.tensors.push(StateTensor { name: name.to_owned(), shape, values });
@@ -185,7 +231,7 @@ impl Batches {
     /// [`crate::Error::Checkpoint`] if a part is missing, or of another size.
     pub fn load(&mut self, state: &OptimiserState) -> Result<bool> {
         self.broken = None;
-        if self.batches.len() == 1 || !state.numbers.iter().any(|(name, _)| name == GRADIENT_NORM) {
+        if self.count() == 1 || !state.numbers.iter().any(|(name, _)| name == GRADIENT_NORM) {
             return Ok(false);
         }
         let shape = vec![self.ln_likelihoods.len()];
@@ -201,11 +247,18 @@ impl Batches {
     }
 }
 
+fn norm(values: &[f64]) -> f64 {
+    values.iter().map(|g| g * g).sum::<f64>().sqrt()
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::plan::Adam;
     use super::*;
+    use crate::dataset::{Dataset, Sequence};
+    use crate::engine::Engine;
     use crate::initialization::initialize;
+    use crate::objective::{Backend, Request};
 
     /// Sequences of 9, 10, 11 ... samples of one channel.
     fn samples(count: usize) -> Vec<Vec<f64>> {
@@ -213,24 +266,27 @@ mod tests {
     }
 
     fn of(samples: &[Vec<f64>], size: usize, topology: &Topology) -> Batches {
-        let items: Vec<Item<'_>> = samples.iter().map(|own| Item { samples: own, steps: own.len() - 1 }).collect();
-        Batches::new(topology, &items, size, false, &Engine::serial())
+        let sequences = samples.iter().map(|own| Sequence::new("", 1, own.clone()).unwrap()).collect();
+        let data = Dataset::new(vec!["y".into()], sequences).unwrap();
+        let objective = Engine::serial().objective(&Request::new(topology, &data)).unwrap();
+        Batches::new(objective, topology, Run::through_all(&data, 1), size)
     }
 
     #[test]
     fn each_sequence_is_dealt_once_into_batches_of_one_size() {
         let topology = Topology::s_ctrnn(1, 3, 2.0).unwrap();
         for (count, size, expected) in [(7, 3, 3), (7, 7, 1), (7, 100, 1), (7, 1, 7), (12, 5, 3), (144, 12, 12)] {
-            let batches = of(&samples(count), size, &topology).batches;
-            assert_eq!(batches.len(), expected);
-            let sizes: Vec<usize> = batches.iter().map(|batch| batch.sequences.len()).collect();
+            let batches = of(&samples(count), size, &topology);
+            assert_eq!(batches.count(), expected);
+            let parts: Vec<&[Run]> = (0..expected).map(|index| &batches.dealt[batches.part(index)]).collect();
+            let sizes: Vec<usize> = parts.iter().map(|part| part.len()).collect();
             let (least, most) = (sizes.iter().min().unwrap(), sizes.iter().max().unwrap());
             assert!(*most <= size && most - least <= 1, "{sizes:?}");
-            let mut dealt: Vec<usize> = batches.iter().flat_map(|batch| batch.sequences.clone()).collect();
+            let mut dealt: Vec<usize> = parts.iter().flat_map(|part| part.iter().map(|run| run.sequence)).collect();
             dealt.sort_unstable();
             assert_eq!(dealt, (0..count).collect::<Vec<_>>());
             // 8 steps of the first sequence, 9 of the second, ...
-            let terms: f64 = batches.iter().map(|batch| batch.terms).sum();
+            let terms: f64 = parts.iter().map(|part| terms(part, 1)).sum();
             assert_eq!(terms, (0..count).map(|s| 8.0 + s as f64).sum::<f64>());
         }
     }
@@ -248,12 +304,11 @@ mod tests {
         near(some.squared_error(), all.squared_error());
         near(some.gradient_norm, all.gradient_norm);
         let (gradients, initial) = all.gradient_of_all();
-        for (i, g) in gradients.as_slice().iter().enumerate() {
-            near(some.batches.iter().map(|batch| batch.objective.gradients.as_slice()[i]).sum(), *g);
-        }
-        for batch in &some.batches {
-            for (own, &sequence) in batch.objective.initial.chunks(5).zip(&batch.sequences) {
-                own.iter().zip(&initial[sequence * 5..]).for_each(|(a, b)| near(*a, *b));
+        some.total.iter().zip(gradients.as_slice()).for_each(|(some, all)| near(*some, *all));
+        for index in 0..some.count() {
+            assert!(some.evaluate_batch(index, &network.parameters, &states));
+            for (own, run) in some.evaluation.initial.chunks(5).zip(&some.dealt[some.part(index)]) {
+                own.iter().zip(&initial[run.sequence * 5..]).for_each(|(a, b)| near(*a, *b));
             }
         }
     }
@@ -276,17 +331,19 @@ mod tests {
             let (mut by_hand, mut own_states) = start.clone();
             let (mut rule, mut met) = (rule(), vec![f64::NAN; 7]);
             let mut single = of(&samples, 2, &topology);
+            rule.begin_epoch(&own_states);
             for (nth, &index) in order.iter().enumerate() {
-                single.evaluate(&by_hand.parameters, &own_states);
-                let Batch { sequences, objective, terms } = &single.batches[index];
-                for &sequence in sequences {
-                    assert!(met[sequence].is_nan());
-                    met[sequence] = single.ln_likelihoods[sequence];
+                rule.end_epoch(&mut own_states);
+                single.evaluate_batch(index, &by_hand.parameters, &own_states);
+                let runs = &single.dealt[single.part(index)];
+                for run in runs {
+                    assert!(met[run.sequence].is_nan());
+                    met[run.sequence] = single.ln_likelihoods[run.sequence];
                 }
-                let batch = adam::Batch { epoch, update: 4 * epoch + nth as u64 + 1, sequences, terms: *terms };
-                let (gradients, initial) = (&objective.gradients, &objective.initial);
-                rule.ascend(&batch, gradients, initial, &mut by_hand.parameters, &mut own_states);
+                let batch = adam::Batch { epoch, update: 4 * epoch + nth as u64 + 1, runs, terms: terms(runs, 1) };
+                rule.ascend(&batch, &single.evaluation, &mut by_hand.parameters, &mut own_states);
             }
+            rule.end_epoch(&mut own_states);
             assert_eq!((&network, &states), (&by_hand, &own_states));
             assert_eq!(batches.ln_likelihoods, met);
             assert_ne!(network, start.0);

@@ -8,7 +8,7 @@
 
 use super::divergence::Divergence;
 use super::learner::State;
-use crate::checkpoint::{OptimiserState, StateTensor};
+use super::state::{OptimiserState, StateTensor};
 use crate::error::{Error, Result};
 use crate::parameters::Parameters;
 

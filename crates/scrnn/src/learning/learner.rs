@@ -8,25 +8,17 @@ use super::lbfgs::LbfgsRule;
 use super::momentum::MomentumRule;
 use super::plan::{OnDivergence, Optimiser, Plan};
 use super::state::Fields;
-use crate::batch::Item;
-use crate::checkpoint::OptimiserState;
+use super::state::OptimiserState;
 use crate::dataset::Dataset;
-use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::initial_states::InitialStates;
 use crate::network::Network;
-
-/// Whether to go on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Control {
-    /// Go on.
-    Continue,
-    /// Stop before the next update.
-    Stop,
-}
+use crate::objective::{Backend, Request, Run};
+use std::ops::ControlFlow;
 
 /// What the evaluation of an epoch found.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct EpochReport {
     /// Epochs done so far; 0 is the initial network.
     pub epoch: u64,
@@ -47,25 +39,29 @@ pub struct EpochReport {
     pub gradient_norm: f64,
     /// How often the training was brought back so far.
     pub recoveries: u64,
+    /// Whether all tries of the adaptive rate (D.1) failed: the update was withdrawn, and the network is that of the epoch before. The
+    /// next one tries at the rate that is left. (`false` in the first report after a training was taken up again.)
+    pub withdrawn: bool,
 }
 
 /// Watches a training, and can stop it.
 pub trait Observer {
     /// Called before each epoch, and after the last: a run of N epochs makes N + 1 calls. `learner` holds what was evaluated (in
     /// batches, what came out of it): saved here and restored later, a training goes on bit for bit.
-    fn epoch(&mut self, report: &EpochReport, learner: &Learner) -> Control;
+    fn epoch(&mut self, report: &EpochReport, learner: &Learner) -> ControlFlow<()>;
 
     /// Called when a training that left its course was brought back, before it goes on.
     fn recovered(&mut self, _recovery: &Recovery) {}
 }
 
-impl<F: FnMut(&EpochReport, &Learner) -> Control> Observer for F {
-    fn epoch(&mut self, report: &EpochReport, learner: &Learner) -> Control {
+impl<F: FnMut(&EpochReport, &Learner) -> ControlFlow<()>> Observer for F {
+    fn epoch(&mut self, report: &EpochReport, learner: &Learner) -> ControlFlow<()> {
         self(report, learner)
     }
 }
 
-/// How a training ended.
+/// How a training ended. Divergence is an outcome and no error: whoever ignores it goes on with a network that never learned.
+#[must_use = "a training may have diverged or been stopped"]
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
     /// All epochs are done.
@@ -136,23 +132,25 @@ pub struct Learner {
     batches: Batches,
     /// The rule of the last epochs. It never needs to be brought back, so it is no part of the state.
     lbfgs: Option<LbfgsRule>,
-    /// All sequences in one batch, for the last epochs after others in several.
-    whole: Option<Batches>,
     /// Whether `batches` already holds what the next report says.
     evaluated: bool,
+    /// Whether the last update was withdrawn for good.
+    withdrawn: bool,
 }
 
 impl Learner {
-    /// A learner at epoch 0. `data` must be in the network's units.
+    /// A learner at epoch 0. `data` must be in the network's units; its samples are shared, not copied. `backend`, an
+    /// [`Engine`](crate::engine::Engine) unless there is another, computes.
     ///
     /// # Errors
-    /// A plan out of range, data that do not fit the network, or initial states for another number of sequences.
+    /// A plan out of range, data that do not fit the network, initial states for another number of sequences or of units, or what the
+    /// backend cannot compute.
     pub fn new(
         network: Network,
         initial_states: InitialStates,
         data: &Dataset,
         plan: Plan,
-        engine: &Engine,
+        backend: &dyn Backend,
     ) -> Result<Self> {
         plan.check()?;
         let topology = &network.topology;
@@ -162,12 +160,11 @@ impl Learner {
             let what = "the list of initial states".to_owned();
             return Err(Error::Length { what, found: initial_states.sequences(), needed: sequences });
         }
+        let (units, needed) = (initial_states.mean().len(), topology.context_units());
+        if units != needed {
+            return Err(Error::Length { what: "each initial state".to_owned(), found: units, needed });
+        }
         let delay = topology.delay();
-        let items: Vec<Item<'_>> = data
-            .sequences()
-            .iter()
-            .map(|sequence| Item { samples: sequence.values(), steps: sequence.len() - delay })
-            .collect();
         let total = data.total_steps(delay);
         let variance = plan.initial_state_variance;
         let first = plan.epochs_of_optimiser();
@@ -184,19 +181,51 @@ impl Learner {
             Optimiser::Adam(adam) if adam.batch_size > 0 => adam.batch_size,
             _ => sequences,
         };
-        let batches = |size| Batches::new(topology, &items, size, plan.recompute, engine);
-        let mut whole = (plan.lbfgs.is_some() && batch_size < sequences).then(|| batches(sequences));
-        if let Some(whole) = &mut whole {
-            // A first pass takes the memory, so that no epoch does.
-            whole.evaluate(&network.parameters, &initial_states);
+        let mut request = Request::new(topology, data);
+        request.recompute = plan.recompute;
+        let objective = backend.objective(&request)?;
+        let mut batches = Batches::new(objective, topology, Run::through_all(data, delay), batch_size);
+        if plan.lbfgs.is_some() && batches.count() > 1 {
+            // A first pass of all at once takes the memory, so that no epoch does.
+            batches.deal(sequences);
+            batches.evaluate(&network.parameters, &initial_states);
+            batches.deal(batch_size);
         }
-        let batches = batches(batch_size);
         let terms = (total * topology.channels()) as f64;
         let lbfgs = plan.lbfgs.as_ref().map(|options| LbfgsRule::new(options, topology, sequences, terms, variance));
         let state = State { network, initial_states, rule, epoch: 0 };
         let guard = (plan.on_divergence == OnDivergence::Recover).then(|| Guard::new(&state));
         let last_good = state.clone();
-        Ok(Self { last_good, state, guard, plan, data: data.clone(), terms, batches, lbfgs, whole, evaluated: false })
+        Ok(Self {
+            last_good,
+            state,
+            guard,
+            plan,
+            data: data.clone(),
+            terms,
+            batches,
+            lbfgs,
+            evaluated: false,
+            withdrawn: false,
+        })
+    }
+
+    /// Goes on where a checkpoint stands, as if the training had never stopped: to the same bits, for the same data, plan and
+    /// backend.
+    ///
+    /// # Errors
+    /// As [`Learner::new`]; [`Error::Checkpoint`] if the checkpoint is of another optimiser.
+    #[cfg(feature = "checkpoint")]
+    pub fn resume(
+        checkpoint: &crate::checkpoint::Checkpoint,
+        data: &Dataset,
+        plan: Plan,
+        backend: &dyn Backend,
+    ) -> Result<Self> {
+        let network = Network::new(checkpoint.topology.clone(), checkpoint.parameters.clone())?;
+        let mut learner = Self::new(network, checkpoint.initial_states.clone(), data, plan, backend)?;
+        learner.restore(checkpoint.epoch, &checkpoint.optimiser)?;
+        Ok(learner)
     }
 
     /// Goes on from a checkpoint, of which `new` got the network and the initial states.
@@ -243,6 +272,12 @@ impl Learner {
     #[must_use]
     pub fn recoveries(&self) -> u64 {
         self.guard.as_ref().map_or(0, |guard| guard.recoveries)
+    }
+
+    /// Names the arithmetic that computes: a training goes on bit for bit only where it is the same.
+    #[must_use]
+    pub fn numerics(&self) -> &str {
+        self.batches.numerics()
     }
 
     /// The optimiser's memory.
@@ -297,7 +332,7 @@ impl Learner {
             if self.state.epoch >= self.plan.epochs {
                 return Outcome::Finished;
             }
-            if control == Control::Stop {
+            if control.is_break() {
                 return Outcome::Stopped;
             }
             self.update();
@@ -307,10 +342,9 @@ impl Learner {
 
     /// Puts all sequences into one batch where L-BFGS begins.
     fn take_whole(&mut self) {
-        if self.refines()
-            && let Some(whole) = self.whole.take()
-        {
-            (self.batches, self.evaluated) = (whole, false);
+        if self.refines() && self.batches.count() > 1 {
+            self.batches.deal(self.data.sequences().len());
+            self.evaluated = false;
         }
     }
 
@@ -336,9 +370,9 @@ impl Learner {
 
     fn divergence(&self) -> Option<Divergence> {
         let State { network, initial_states, epoch, .. } = &self.state;
-        let mut divergence = if let Some(s) = self.batches.sequence_without_numbers() {
+        let mut divergence = if let Some(s) = self.batches.non_finite_sequence() {
             Divergence::in_sequence(*epoch, network, initial_states, &self.data, s)
-        } else if let Some(gradients) = self.batches.gradient_without_numbers() {
+        } else if let Some(gradients) = self.batches.non_finite_gradient() {
             Divergence::in_gradient(*epoch, gradients)
         } else {
             Divergence::of_likelihood(*epoch, self.least_likely(), self.rise()?)
@@ -378,13 +412,14 @@ impl Learner {
             rate_initial,
             gradient_norm: self.batches.gradient_norm,
             recoveries: self.recoveries(),
+            withdrawn: self.withdrawn,
         }
     }
 
     fn update(&mut self) {
         let refines = self.refines();
         let State { network, initial_states, rule, epoch } = &mut self.state;
-        self.evaluated = false;
+        (self.evaluated, self.withdrawn) = (false, false);
         if let Some(lbfgs) = self.lbfgs.as_mut().filter(|_| refines) {
             self.evaluated = lbfgs.ascend(&mut self.batches, &mut network.parameters, initial_states);
             return;
@@ -400,20 +435,20 @@ impl Learner {
                 let (gradients, initial) = self.batches.gradient_of_all();
                 rule.accumulate(&network.topology, gradients, initial, initial_states);
                 rule.apply(&mut network.parameters, initial_states);
-                if rule.options.adaptive.is_some() {
+                if rule.options.adaptive_rate.is_some() {
                     self.adapt();
                 }
             }
         }
     }
 
-    /// Accepts the tentative update, or withdraws it and tries a lower rate (D.1). The last good state holds the
-    /// parameters before the update.
+    /// Accepts the tentative update, or withdraws it and tries a lower rate (D.1). Every try is judged; where the last one fails too,
+    /// nothing moves in this epoch. The last good state holds the parameters before the update.
     fn adapt(&mut self) {
         let before = self.batches.squared_error();
         let Rule::Momentum(rule) = &self.state.rule else { return };
-        let Some(options) = rule.options.adaptive.clone() else { return };
-        for _ in 1..options.max_tries {
+        let Some(options) = rule.options.adaptive_rate.clone() else { return };
+        for tries_left in (0..options.max_tries).rev() {
             self.evaluated = false;
             self.evaluate();
             let ratio = self.batches.squared_error() / before;
@@ -429,8 +464,10 @@ impl Learner {
             network.parameters.as_mut_slice().copy_from_slice(good.network.parameters.as_slice());
             initial_states.values_mut().copy_from_slice(good.initial_states.values());
             initial_states.mean_mut().copy_from_slice(good.initial_states.mean());
-            rule.apply(&mut network.parameters, initial_states);
+            if tries_left > 0 {
+                rule.apply(&mut network.parameters, initial_states);
+            }
         }
-        self.evaluated = false;
+        (self.evaluated, self.withdrawn) = (false, true);
     }
 }

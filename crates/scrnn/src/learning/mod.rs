@@ -4,19 +4,20 @@
 
 mod adam;
 mod batches;
-mod coordinates;
 mod divergence;
 mod guard;
 mod lbfgs;
 mod learner;
 mod momentum;
+mod non_centred;
 mod plan;
 mod state;
 
 pub use divergence::Divergence;
 pub use guard::Recovery;
-pub use learner::{Control, EpochReport, Learner, Observer, Outcome};
+pub use learner::{EpochReport, Learner, Observer, Outcome};
 pub use plan::{Adam, AdaptiveRate, Lbfgs, Momentum, OnDivergence, Optimiser, Plan, PriorStep};
+pub use state::{OptimiserState, StateTensor};
 
 #[cfg(test)]
 mod extremes_tests;

@@ -32,6 +32,8 @@ pub(super) struct MomentumRule {
     pub factor: f64,
     /// The guard's factor; 1 unless the training left its course.
     pub guarded: f64,
+    /// d ln L_all / d u_0 and of the mean, where the prior acts as printed.
+    gradient: Option<InitialStates>,
     learns: Vec<bool>,
     /// alpha_share and alpha_init for a factor of 1.
     rates: (f64, f64),
@@ -49,6 +51,7 @@ impl MomentumRule {
         let n_o = topology.channels() as f64;
         Self {
             rates: (options.rate / (total_steps as f64 * n_o), options.rate / n_o),
+            gradient: (options.prior == PriorStep::Thesis).then(|| InitialStates::zeros(topology, states.sequences())),
             options,
             shared: vec![0.0; Parameters::zeros(topology).as_slice().len()],
             initial: vec![0.0; states.values().len()],
@@ -72,23 +75,19 @@ impl MomentumRule {
         for (delta, g) in self.shared.iter_mut().zip(gradients.as_slice()) {
             *delta = g + eta * *delta;
         }
-        match self.options.prior {
-            PriorStep::Implicit => {
-                for (delta, g) in self.initial.iter_mut().zip(initial) {
-                    *delta = g + eta * *delta;
-                }
+        let Some(gradient) = &mut self.gradient else {
+            for (delta, g) in self.initial.iter_mut().zip(initial) {
+                *delta = g + eta * *delta;
             }
-            PriorStep::Thesis => {
-                let mut gradient = InitialStates::zeros(topology, states.sequences());
-                gradient.values_mut().copy_from_slice(initial);
-                states.add_prior_gradient(topology, self.variance, &mut gradient);
-                for (delta, g) in self.initial.iter_mut().zip(gradient.values()) {
-                    *delta = g + eta * *delta;
-                }
-                for (delta, g) in self.mean.iter_mut().zip(gradient.mean()) {
-                    *delta = g + eta * *delta;
-                }
-            }
+            return;
+        };
+        gradient.values_mut().copy_from_slice(initial);
+        states.add_prior_gradient(topology, self.variance, gradient);
+        for (delta, g) in self.initial.iter_mut().zip(gradient.values()) {
+            *delta = g + eta * *delta;
+        }
+        for (delta, g) in self.mean.iter_mut().zip(gradient.mean()) {
+            *delta = g + eta * *delta;
         }
     }
 

@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 
 /// A training.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Plan {
     /// Passes through the data; each is one update, but for Adam in batches. An epoch of L-BFGS is an update, and now and then more
     /// than one pass.
@@ -23,6 +24,9 @@ pub struct Plan {
 
 /// What to do when a training leaves its course.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum OnDivergence {
     /// Go back to the last finite epoch and stop. A likelihood that collapses while all values stay finite is let pass.
     Stop,
@@ -45,6 +49,7 @@ impl Default for Plan {
 
 /// How to ascend.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Optimiser {
     /// Gradient ascent with momentum, the thesis' rule (2.17)-(2.19).
     Momentum(Momentum),
@@ -55,6 +60,10 @@ pub enum Optimiser {
 /// Gradient ascent with momentum. With T_total steps in all and N_O channels, shared parameters ascend at
 /// alpha / (T_total N_O) and initial states at alpha / N_O (2.7).
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
+#[non_exhaustive]
 pub struct Momentum {
     /// alpha-tilde.
     pub rate: f64,
@@ -63,17 +72,21 @@ pub struct Momentum {
     /// How the prior acts on initial states and their mean.
     pub prior: PriorStep,
     /// Whether the rate adapts (D.1).
-    pub adaptive: Option<AdaptiveRate>,
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub adaptive_rate: Option<AdaptiveRate>,
 }
 
 impl Default for Momentum {
     fn default() -> Self {
-        Self { rate: 1e-4, momentum: 0.9, prior: PriorStep::Implicit, adaptive: None }
+        Self { rate: 1e-4, momentum: 0.9, prior: PriorStep::Implicit, adaptive_rate: None }
     }
 }
 
 /// How the prior (2.23), (2.24) enters a step of gradient ascent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum PriorStep {
     /// Solved for where the step ends: stable for any variance, and the literal rule where that is stable.
     Implicit,
@@ -82,8 +95,14 @@ pub enum PriorStep {
 }
 
 /// The adaptive rate (D.1): one factor on both rates. An update that lets the squared error grow by more than
-/// `max_error_ratio` is withdrawn and tried again at a lower rate.
+/// `max_error_ratio` is withdrawn and tried again at a lower rate. Every try is judged: where none holds, nothing moves in this
+/// epoch, the report says so ([`EpochReport::withdrawn`](super::EpochReport::withdrawn)), and the next epoch begins at the rate that
+/// is left.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
+#[non_exhaustive]
 pub struct AdaptiveRate {
     /// r_th.
     pub max_error_ratio: f64,
@@ -91,7 +110,7 @@ pub struct AdaptiveRate {
     pub decrease: f64,
     /// alpha_inc.
     pub increase: f64,
-    /// Tries for each epoch.
+    /// Tries for each epoch, at least 1.
     pub max_tries: u32,
 }
 
@@ -104,6 +123,10 @@ impl Default for AdaptiveRate {
 /// Adam on the gradient of ln L per step and channel. Initial states are written u_0 = mean + s z with
 /// s = min(sigma_IS, 1), and Adam moves z and the mean: no prior is too narrow for it.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
+#[non_exhaustive]
 pub struct Adam {
     /// The largest rate.
     pub rate: f64,
@@ -156,6 +179,10 @@ impl Default for Adam {
 /// Where a small network has to be exact it gets far further than a rule of first order. It finds the nearest maximum: let the
 /// optimiser choose which one that is.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
+#[non_exhaustive]
 pub struct Lbfgs {
     /// Share of the epochs, the last ones; 1 leaves none to the optimiser.
     pub share: f64,
@@ -180,45 +207,98 @@ impl Plan {
     /// Checks every setting.
     ///
     /// # Errors
-    /// [`Error::Setting`] names the first one that is out of its range.
+    /// [`Error::Setting`] names the first one that is out of its range, e.g. `adam.rate`.
     pub fn check(&self) -> Result<()> {
-        let positive = |what, value: f64| require(what, value, value > 0.0, "a positive number");
-        let not_negative = |what, value: f64| require(what, value, value >= 0.0, "0 or a positive number");
-        let share = |what, value: f64| require(what, value, (0.0..1.0).contains(&value), "at least 0 and below 1");
         positive("initial_state_variance", self.initial_state_variance)?;
-        if let Some(Lbfgs { share, memory }) = self.lbfgs {
-            require("lbfgs.share", share, (0.0..=1.0).contains(&share), "at least 0 and at most 1")?;
-            require("lbfgs.memory", memory as f64, memory >= 1, "at least 1")?;
+        if let Some(lbfgs) = &self.lbfgs {
+            lbfgs.check()?;
         }
         match &self.optimiser {
-            Optimiser::Momentum(momentum) => {
-                positive("momentum.rate", momentum.rate)?;
-                share("momentum.momentum", momentum.momentum)?;
-                if let Some(adaptive) = &momentum.adaptive {
-                    let AdaptiveRate { max_error_ratio, decrease, increase, max_tries } = *adaptive;
-                    let at_least_1 = |what, value: f64| require(what, value, value >= 1.0, "at least 1");
-                    at_least_1("adaptive_rate.max_error_ratio", max_error_ratio)?;
-                    at_least_1("adaptive_rate.increase", increase)?;
-                    positive("adaptive_rate.decrease", decrease)?;
-                    share("adaptive_rate.decrease", decrease)?;
-                    at_least_1("adaptive_rate.max_tries", f64::from(max_tries))?;
-                }
-            }
-            Optimiser::Adam(adam) => {
-                positive("adam.rate", adam.rate)?;
-                share("adam.warm_up", adam.warm_up)?;
-                not_negative("adam.final_rate", adam.final_rate)?;
-                not_negative("adam.clip_norm", adam.clip_norm)?;
-                not_negative("adam.weight_decay", adam.weight_decay)?;
-                not_negative("adam.initial_state_factor", adam.initial_state_factor)?;
-                not_negative("adam.mean_factor", adam.mean_factor)?;
-                share("adam.beta1", adam.beta1)?;
-                share("adam.beta2", adam.beta2)?;
-                positive("adam.epsilon", adam.epsilon)?;
+            Optimiser::Momentum(momentum) => momentum.check(),
+            Optimiser::Adam(adam) => adam.check(),
+        }
+    }
+}
+
+impl Momentum {
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] names the first one that is out of its range, e.g. `momentum.rate`.
+    pub fn check(&self) -> Result<()> {
+        positive("momentum.rate", self.rate)?;
+        below_one("momentum.momentum", self.momentum)?;
+        let Some(AdaptiveRate { max_error_ratio, decrease, increase, max_tries }) = self.adaptive_rate else {
+            return Ok(());
+        };
+        let at_least_1 = |what, value: f64| require(what, value, value >= 1.0, "a number, at least 1");
+        at_least_1("momentum.adaptive_rate.max_error_ratio", max_error_ratio)?;
+        let inside = decrease > 0.0 && decrease < 1.0;
+        require("momentum.adaptive_rate.decrease", decrease, inside, "a number between 0 and 1")?;
+        at_least_1("momentum.adaptive_rate.increase", increase)?;
+        at_least_1("momentum.adaptive_rate.max_tries", f64::from(max_tries))
+    }
+}
+
+impl Adam {
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] names the first one that is out of its range, e.g. `adam.rate`.
+    pub fn check(&self) -> Result<()> {
+        positive("adam.rate", self.rate)?;
+        below_one("adam.warm_up", self.warm_up)?;
+        not_negative("adam.final_rate", self.final_rate)?;
+        not_negative("adam.clip_norm", self.clip_norm)?;
+        not_negative("adam.weight_decay", self.weight_decay)?;
+        not_negative("adam.initial_state_factor", self.initial_state_factor)?;
+        not_negative("adam.mean_factor", self.mean_factor)?;
+        below_one("adam.beta1", self.beta1)?;
+        below_one("adam.beta2", self.beta2)?;
+        positive("adam.epsilon", self.epsilon)
+    }
+}
+
+impl Lbfgs {
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] names the first one that is out of its range, e.g. `lbfgs.share`.
+    pub fn check(&self) -> Result<()> {
+        require("lbfgs.share", self.share, (0.0..=1.0).contains(&self.share), "a number from 0 to 1")?;
+        // Twice as many numbers as parameters for each.
+        let sound = (1..=1000).contains(&self.memory);
+        require("lbfgs.memory", self.memory as f64, sound, "a number from 1 to 1000")
+    }
+}
+
+/// `with` for options: the defaults with some of them changed.
+macro_rules! with {
+    ($($options:ident),*) => {$(
+        impl $options {
+            /// The defaults with some of them changed.
+            #[must_use]
+            pub fn with(change: impl FnOnce(&mut Self)) -> Self {
+                let mut options = Self::default();
+                change(&mut options);
+                options
             }
         }
-        Ok(())
-    }
+    )*};
+}
+
+with!(Plan, Momentum, AdaptiveRate, Adam, Lbfgs);
+
+fn positive(what: &'static str, value: f64) -> Result<()> {
+    require(what, value, value > 0.0, "a number above 0")
+}
+
+fn not_negative(what: &'static str, value: f64) -> Result<()> {
+    require(what, value, value >= 0.0, "0 or a number above it")
+}
+
+fn below_one(what: &'static str, value: f64) -> Result<()> {
+    require(what, value, (0.0..1.0).contains(&value), "a number from 0 to just below 1")
 }
 
 fn require(what: &'static str, value: f64, holds: bool, needed: &'static str) -> Result<()> {

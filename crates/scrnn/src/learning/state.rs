@@ -1,7 +1,26 @@
 //! An optimiser's memory, in and out of a checkpoint.
 
-use crate::checkpoint::{OptimiserState, StateTensor};
 use crate::error::{Error, Result};
+
+/// Tensors and numbers of an optimiser, enough to go on bit for bit. Any value is kept, also NaN and infinity.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct OptimiserState {
+    /// Velocities, moments and their like. Names are distinct, and none is `numbers`.
+    pub tensors: Vec<StateTensor>,
+    /// Counters, rates and their like.
+    pub numbers: Vec<(String, f64)>,
+}
+
+/// One tensor of an optimiser.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct StateTensor {
+    /// Its name, to which the file adds `optimiser.` in front.
+    pub name: String,
+    /// Its shape.
+    pub shape: Vec<usize>,
+    /// Its values, row-major.
+    pub values: Vec<f64>,
+}
 
 /// Everything that an optimiser must find again to go on bit for bit, under its names.
 pub(super) struct Fields<'a> {

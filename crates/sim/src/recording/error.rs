@@ -4,6 +4,10 @@
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordingError {
+    /// The world that was to be recorded.
+    #[error(transparent)]
+    World(#[from] crate::error::Error),
+
     /// A number that no message can hold.
     #[error("{topic} at {time} ns: {what} is {value}; needed: a finite number")]
     NotFinite {

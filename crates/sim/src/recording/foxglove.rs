@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::Links;
 use super::wire::Message;
-use crate::scene::{Body, Part, Scene, Shape};
+use crate::world::scene::{Body, Part, Scene, Shape};
 
 /// The frame that all others stand in.
 pub const WORLD: &str = "world";

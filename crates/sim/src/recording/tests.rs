@@ -5,7 +5,7 @@ use std::io::{self, Cursor, SeekFrom};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::*;
-use crate::scene::{Body, Frame, Part, Shape};
+use crate::world::scene::{Body, Frame, Part, Shape};
 
 const URDF: &str = r#"<robot name="arm"><link name="base"/><link name="upper"/><link name="hand"/>
 <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>

@@ -11,10 +11,10 @@ use scrnn::generation::{ChannelFeedback, Feedback, Generated, GenerationOptions,
 use serde_json::{Value, json};
 
 use crate::args::{Part, Shared};
-use crate::failure::{Ending, Failure, Result};
-use scrnn_data::{self as files, Field};
 use crate::output;
-use crate::trained::Trained;
+use scrnn_data::{self as files, Field};
+use scrnn_run::failure::{Ending, Failure, Result};
+use scrnn_run::trained::Trained;
 use starts::Row;
 
 pub use starts::unit_names;
@@ -102,15 +102,16 @@ enum Mode {
 pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     let trained = Trained::open(&arguments.run, arguments.best)?;
     let feedback = feedback(arguments, &trained.checkpoint)?;
-    let rows = starts::rows(arguments, &trained, feedback.0.iter().any(|channel| channel.sensed > 0.0))?;
+    let rows = starts::rows(
+        (arguments, &trained),
+        shared.engine()?.threads(),
+        feedback.0.iter().any(|channel| channel.sensed > 0.0),
+    )?;
     let starts: Vec<Start<'_>> =
         rows.iter().map(|row| Start { initial_state: &row.state, sensed: &row.sensed }).collect();
-    let options = GenerationOptions {
-        steps: rows.iter().map(|row| row.steps).max().unwrap_or(0),
-        feedback,
-        seed: arguments.seed,
-        contexts: arguments.contexts,
-    };
+    let options = GenerationOptions::new(rows.iter().map(|row| row.steps).max().unwrap_or(0), feedback)
+        .seed(arguments.seed)
+        .contexts(arguments.contexts);
     let generated = generate(&trained.network(), &starts, &options, &shared.engine()?)?;
     let fields = fields(&trained.checkpoint, &rows, &generated)?;
     if arguments.json {

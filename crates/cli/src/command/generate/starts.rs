@@ -7,9 +7,9 @@ use scrnn::dataset::Dataset;
 use scrnn::topology::Group;
 
 use super::Arguments;
-use crate::failure::{Failure, Result};
 use scrnn_data as files;
-use crate::trained::Trained;
+use scrnn_run::failure::{Failure, Result};
+use scrnn_run::trained::Trained;
 
 /// One sequence to generate.
 #[derive(Debug, Clone)]
@@ -32,18 +32,19 @@ struct State {
     learned: Option<usize>,
 }
 
-/// The sequences to generate. `sensing` says whether recorded samples are needed beyond the first.
-pub fn rows(arguments: &Arguments, trained: &Trained, sensing: bool) -> Result<Vec<Row>> {
+/// The sequences to generate. `sensing` says whether recorded samples are needed beyond the first; where simulated robots
+/// make them, so many threads are used.
+pub fn rows((arguments, trained): (&Arguments, &Trained), threads: usize, sensing: bool) -> Result<Vec<Row>> {
     let checkpoint = &trained.checkpoint;
     let states = states(arguments, checkpoint)?;
     let mut rows = match (&arguments.data, sensing) {
         (Some(path), _) => {
             let data = files::read_part(path, &arguments.part.of(path, trained.selection()))?;
-            trained.check_channels(&data, path)?;
+            let data = trained.fitted(data, path)?;
             pair(states, &data, checkpoint)?
         }
         (None, true) => {
-            let data = trained.learned_data()?;
+            let data = trained.learned_data(threads)?;
             if states.iter().all(|state| state.learned.is_some()) {
                 let of = |state: State| {
                     let s = state.learned.unwrap_or_default();

@@ -21,12 +21,12 @@ use serde::Serialize;
 
 use crate::args::{Part, Shared};
 use crate::command::generate::unit_names;
-use crate::failure::{Ending, Failure, Result};
-use scrnn_data::{self as files, Field};
 use crate::output;
-use crate::table::Table;
-use crate::trained::Trained;
 use online::{How, Online};
+use scrnn_data::{self as files, Field};
+use scrnn_report::Table;
+use scrnn_run::failure::{Ending, Failure, Result};
+use scrnn_run::trained::Trained;
 
 /// How many of the learned sequences the table names.
 const NAMED: usize = 3;
@@ -76,7 +76,7 @@ pub struct Arguments {
     #[arg(long)]
     best: bool,
     /// Write the best initial states, for `scrnn generate --initial-state`; with --online, each sample as predicted and as
-    /// postdicted
+    /// smoothed
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
     /// With --observed: write the sequences with their rest as predicted
@@ -141,8 +141,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     let trained = Trained::open(&arguments.run, arguments.best)?;
     let checkpoint = &trained.checkpoint;
     let part = arguments.part.of(&arguments.data, trained.selection());
-    let data = files::read_part(&arguments.data, &part)?;
-    trained.check_channels(&data, &arguments.data)?;
+    let data = trained.fitted(files::read_part(&arguments.data, &part)?, &arguments.data)?;
     data.check_for(&checkpoint.topology)?;
     let delay = checkpoint.topology.delay();
     if let Some(observed) = arguments.observed.filter(|observed| *observed <= delay) {
@@ -176,17 +175,16 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
 }
 
 fn options(arguments: &Arguments, trained: &Trained) -> RecognitionOptions {
-    let mut options = RecognitionOptions {
-        starts: arguments.starts as usize,
-        epochs: arguments.epochs,
-        seed: arguments.seed,
-        observed: arguments.observed,
-        ..RecognitionOptions::default()
-    };
+    let mut options = RecognitionOptions::with(|it| {
+        it.starts = arguments.starts as usize;
+        it.epochs = arguments.epochs;
+        it.seed = arguments.seed;
+        it.observed = arguments.observed;
+    });
     if let Some(rate) = arguments.rate {
         options.rate = rate;
     }
-    let variance = |notes: &crate::notes::Notes| notes.experiment["network"]["initial_state_variance"].as_f64();
+    let variance = |notes: &scrnn_run::notes::Notes| notes.experiment["network"]["initial_state_variance"].as_f64();
     if let Some(variance) = trained.notes.as_ref().and_then(variance) {
         options.initial_state_variance = variance;
     }
@@ -212,7 +210,7 @@ fn replay(
         .collect();
     let longest = scaled.sequences().iter().map(Sequence::len).max().unwrap_or(0);
     let steps = longest - trained.checkpoint.topology.delay();
-    let options = GenerationOptions { steps, feedback: Feedback::mixed(n, 1.0, false), seed: 0, contexts: false };
+    let options = GenerationOptions::new(steps, Feedback::mixed(n, 1.0, false)).seed(0);
     Ok(generate(&trained.network(), &starts, &options, engine)?)
 }
 

@@ -15,11 +15,11 @@ use super::regression::RegressionArguments;
 use super::stream::{Arrival, Stream};
 use crate::args::{Part, Shared};
 use crate::command::generate::unit_names;
-use crate::failure::{Ending, Failure, Result};
-use scrnn_data::{self as files, Field};
 use crate::output;
-use crate::table::Table;
-use crate::trained::Trained;
+use scrnn_data::{self as files, Field};
+use scrnn_report::Table;
+use scrnn_run::failure::{Ending, Failure, Result};
+use scrnn_run::trained::Trained;
 
 /// How to follow.
 #[derive(Debug, Args)]
@@ -35,8 +35,8 @@ pub struct Online {
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', requires = "online")]
     closed_channels: Vec<String>,
     /// Channels whose errors are not regressed on
-    #[arg(long, value_name = "NAME,...", value_delimiter = ',', requires = "online")]
-    unheeded_channels: Vec<String>,
+    #[arg(long, alias = "unheeded-channels", value_name = "NAME,...", value_delimiter = ',', requires = "online")]
+    masked_channels: Vec<String>,
     /// Start from the state of the K-th learned sequence, counted from 1 [default: their mean]
     #[arg(long, value_name = "K", requires = "online")]
     sequence: Option<usize>,
@@ -56,7 +56,7 @@ impl Online {
         let mut options = how.regression.options(how.rate, channels.len())?;
         options.ahead = self.ahead;
         for (names, shares) in
-            [(&self.closed_channels, &mut options.sensed), (&self.unheeded_channels, &mut options.heeded)]
+            [(&self.closed_channels, &mut options.sensed), (&self.masked_channels, &mut options.mask)]
         {
             for name in names {
                 let channel = channels.iter().position(|channel| channel == name).ok_or_else(|| {
@@ -113,7 +113,7 @@ struct View {
     /// Number of the window's first sample, from 1.
     from: usize,
     /// What the window now says about its samples.
-    postdicted: Vec<Vec<f64>>,
+    smoothed: Vec<Vec<f64>>,
     /// The contexts that go with them.
     contexts: Vec<Vec<f64>>,
     /// What is predicted of the samples to come.
@@ -142,7 +142,7 @@ struct Followed {
 struct Rows {
     mean: Vec<f64>,
     variance: Vec<f64>,
-    postdicted: Vec<f64>,
+    smoothed: Vec<f64>,
     context: Vec<f64>,
 }
 
@@ -159,7 +159,7 @@ impl<'a> Session<'a> {
     fn new(online: &Online, how: &How<'_>, trained: &'a Trained, shared: &Shared) -> Result<Self> {
         let options = online.options(how, trained)?;
         let start = online.start(trained)?;
-        let regression = ErrorRegression::new(&trained.network(), start, options, shared.instruction_set())?;
+        let regression = ErrorRegression::new(&trained.network(), start, options, &shared.engine()?)?;
         let (deadline, scaled) = (how.regression.clock()?, vec![0.0; trained.checkpoint.channels.len()]);
         Ok(Self { trained, regression, deadline, taken: 0, scaled })
     }
@@ -199,11 +199,11 @@ impl<'a> Session<'a> {
         let has_variance = self.trained.checkpoint.topology.has_variance();
         View {
             from: self.taken + 1 - window,
-            postdicted: (0..window).map(|k| raw(self.regression.postdicted_mean(k))).collect(),
+            smoothed: (0..window).map(|k| raw(self.regression.smoothed_mean(k))).collect(),
             contexts: (0..window).map(|k| self.regression.context(k).to_vec()).collect(),
-            predicted: future.clone().map(|k| raw(self.regression.foreseen_mean(k))).collect(),
+            predicted: future.clone().map(|k| raw(self.regression.forecast_mean(k))).collect(),
             variance: match has_variance {
-                true => future.map(|k| raw_variance(self.regression.foreseen_variance(k))).collect(),
+                true => future.map(|k| raw_variance(self.regression.forecast_variance(k))).collect(),
                 false => Vec::new(),
             },
         }
@@ -225,10 +225,9 @@ pub fn run(
         }
         return stream(online, how, &trained, as_json, shared);
     }
-    let data = files::read_part(data, &part.of(data, trained.selection())).map_err(Failure::from).and_then(|set| {
-        trained.check_channels(&set, data)?;
-        Ok(set)
-    })?;
+    let data = files::read_part(data, &part.of(data, trained.selection()))
+        .map_err(Failure::from)
+        .and_then(|set| trained.fitted(set, data))?;
     let mut followed = Vec::new();
     for sequence in data.sequences() {
         followed.push(follow(online, how, &trained, sequence, shared)?);
@@ -263,8 +262,8 @@ fn follow(online: &Online, how: &How<'_>, trained: &Trained, sequence: &Sequence
         let done = session.observe(sample)?;
         if k >= delay {
             let last = session.regression.window() - 1;
-            let postdicted = session.regression.postdicted_mean(last).iter().enumerate();
-            rows.postdicted.extend(postdicted.map(|(i, &y)| scaling.to_raw(i, y)));
+            let smoothed = session.regression.smoothed_mean(last).iter().enumerate();
+            rows.smoothed.extend(smoothed.map(|(i, &y)| scaling.to_raw(i, y)));
             rows.context.extend_from_slice(session.regression.context(last));
         }
         steps.push(session.told(&done, online.at.contains(&(k + 1)), online.ahead));
@@ -333,7 +332,7 @@ fn write(path: &Path, trained: &Trained, followed: &[Followed]) -> Result<()> {
     if trained.checkpoint.topology.has_variance() {
         fields.push(("variance", field(channels, &|rows| &rows.variance)?));
     }
-    fields.push(("postdicted", field(channels, &|rows| &rows.postdicted)?));
+    fields.push(("smoothed", field(channels, &|rows| &rows.smoothed)?));
     fields.push(("context", field(&units, &|rows| &rows.context)?));
     let fields: Vec<Field<'_>> = fields.iter().map(|(name, data)| Field { name, data }).collect();
     Ok(files::write(path, &fields)?)

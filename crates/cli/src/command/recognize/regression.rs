@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use scrnn::error_regression::{Ascent, ErrorRegressionOptions};
 
 use super::deadline::Deadline;
-use crate::failure::{Failure, Result};
+use scrnn_run::failure::{Failure, Result};
 
 /// Options of error regression.
 #[derive(Debug, Args)]
@@ -69,8 +69,7 @@ impl RegressionArguments {
             (None, None) => {}
         }
         if let Some(given) = rate {
-            let (Ascent::Momentum { rate, .. } | Ascent::Adam { rate }) = &mut options.ascent;
-            *rate = given;
+            options.ascent = options.ascent.with_rate(given);
         }
         if let Some(norm) = self.max_norm {
             options.max_norm = Some(norm).filter(|&norm| norm != 0.0);

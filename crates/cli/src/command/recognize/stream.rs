@@ -3,7 +3,7 @@
 use std::io::BufRead;
 use std::path::Path;
 
-use crate::failure::{Failure, Result};
+use scrnn_run::failure::{Failure, Result};
 
 /// Columns that are no channels.
 const NOT_CHANNELS: [&str; 3] = ["sequence", "step", "time"];

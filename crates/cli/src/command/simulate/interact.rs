@@ -6,19 +6,20 @@ use clap::Args;
 use scrnn::analysis::excursions::Side;
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions};
-use scrnn_sim::follower::{Branch, Followed, Mind, Outcome, follow, with_own_arm};
+use scrnn_sim::follower::{Branch, ControlStep, Controller, Followed, Outcome, follow, with_own_arm};
 use scrnn_sim::interaction::{CHANNELS, Interaction, InteractionOptions, letters, parse_order, random_order};
 use serde::Serialize;
 use serde_json::json;
 
 use crate::args::Shared;
 use crate::command::recognize::{Latency, RegressionArguments};
-use crate::failure::{Ending, Failure, Result};
-use scrnn_data::{self as files, Field};
-use crate::interactions::{BRANCHES, Film};
 use crate::output;
-use crate::table::Table;
-use crate::trained::Trained;
+use scrnn_data::{self as files, Field};
+use scrnn_report::Table;
+use scrnn_run::failure::{Ending, Failure, Result};
+use scrnn_run::trained::Trained;
+use scrnn_sim::film::Film;
+use scrnn_tasks::interact::BRANCHES;
 
 /// Two robots: the network follows the other robot's object with its arm
 ///
@@ -92,6 +93,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         Some(_) => Some(Film::new(&[("run", &arguments.run.display().to_string())])?),
         None => None,
     };
+    let engine = shared.engine()?;
     let mut trials = Vec::new();
     for trial in 0..u64::from(arguments.trials) {
         let seed = arguments.seed.wrapping_add(trial << 32);
@@ -100,39 +102,32 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
             None => random_order(BRANCHES, 0.5, seed),
         };
         let (initial_state, state) = arguments.start(&trained, &order)?;
-        let mind = Mind {
-            network: &network,
-            scaling: &checkpoint.scaling,
-            initial_state: state,
-            instruction_set: shared.instruction_set(),
-        };
+        let controller =
+            Controller { network: &network, scaling: &checkpoint.scaling, initial_state: state, engine: &engine };
         let mut interaction = Interaction::new(&order, &InteractionOptions::default(), seed)?;
         let mut deadline = arguments.regression.clock()?;
         if let Some(film) = &mut film {
             film.begin(&letters(&order))?;
         }
-        let mut failed = None;
         let observe = |regression: &mut ErrorRegression, sample: &[f64]| {
             deadline.sample(|go_on| regression.observe(sample, go_on))
         };
-        let followed = follow(&mind, &options, &mut interaction, observe, |interaction, moment, _| {
-            let Some(film) = film.as_mut().filter(|_| failed.is_none()) else { return };
+        let watch = |interaction: &Interaction, step: &ControlStep, _: &ErrorRegression| -> Result<()> {
+            let Some(film) = film.as_mut() else { return Ok(()) };
             let scaling = &checkpoint.scaling;
             let raw = |y: [f64; 8]| (0..8).map(|i| scaling.to_raw(i, y[i])).collect::<Vec<_>>();
-            let mean = moment.predicted.map(raw);
+            let mean = step.predicted.map(raw);
             let variance: Vec<f64> =
-                moment.variance.iter().enumerate().map(|(i, &v)| scaling.variance_to_raw(i, v)).collect();
+                step.variance.iter().enumerate().map(|(i, &v)| scaling.variance_to_raw(i, v)).collect();
             let variance = Some(variance.as_slice()).filter(|variance| !variance.is_empty());
-            failed = film.frame(interaction, &moment.sensed, mean.as_deref().map(|mean| (mean, variance))).err();
-        })?;
-        if let Some(failure) = failed {
-            return Err(failure);
-        }
+            Ok(film.frame(interaction, &step.sensed, mean.as_deref().map(|mean| (mean, variance)))?)
+        };
+        let followed = follow(&controller, &options, &mut interaction, observe, watch)?;
         let (order, branches) = (letters(&order), followed.branches.clone());
         trials.push(Trial { order, initial_state, branches, latency: deadline.latency(), followed });
     }
     if let (Some(film), Some(path)) = (film, &arguments.mcap) {
-        film.write(path)?;
+        files::replace(path, &film.finish()?)?;
     }
     if let Some(path) = &arguments.out {
         write(path, &trained, &trials)?;
@@ -216,8 +211,8 @@ fn told(trials: &[Trial]) -> String {
 fn write(path: &std::path::Path, trained: &Trained, trials: &[Trial]) -> Result<()> {
     let (checkpoint, n) = (&trained.checkpoint, CHANNELS.len());
     let (scaling, delay) = (&checkpoint.scaling, checkpoint.topology.delay());
-    let moments = |trial: &Trial| trial.followed.moments.get(delay..).unwrap_or_default().to_vec();
-    let field = |names: Vec<String>, of: &dyn Fn(&scrnn_sim::follower::Moment) -> Vec<f64>| -> Result<Dataset> {
+    let moments = |trial: &Trial| trial.followed.steps.get(delay..).unwrap_or_default().to_vec();
+    let field = |names: Vec<String>, of: &dyn Fn(&scrnn_sim::follower::ControlStep) -> Vec<f64>| -> Result<Dataset> {
         let rows = trials
             .iter()
             .map(|trial| Sequence::new(trial.order.clone(), names.len(), moments(trial).iter().flat_map(of).collect()));

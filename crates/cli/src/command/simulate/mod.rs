@@ -6,7 +6,7 @@ mod reach;
 use clap::{Args, Subcommand};
 
 use crate::args::Shared;
-use crate::failure::{Ending, Result};
+use scrnn_run::failure::{Ending, Result};
 
 /// Let a trained network move a robot in a simulated world
 ///

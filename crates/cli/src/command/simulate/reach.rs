@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::Args;
-use scrnn_sim::agent::{Glimpse, NetworkDriver, Noise, Performance, perform};
+use scrnn_sim::agent::{NetworkDriver, Noise, Performance, Snapshot, perform};
 use scrnn_sim::channels::REACHING;
 use scrnn_sim::reaching::{CYCLE, POSITIONS};
 use scrnn_sim::reaching_recording::ReachingRecording;
@@ -14,12 +14,12 @@ use scrnn_sim::world::WorldOptions;
 use serde::{Deserialize, Serialize};
 
 use crate::args::Shared;
-use crate::experiment::Experiment;
-use crate::failure::{Ending, Failure, Result};
-use scrnn_data as files;
 use crate::output;
-use crate::table::Table;
-use crate::trained::Trained;
+use scrnn_data as files;
+use scrnn_report::Table;
+use scrnn_run::experiment::Experiment;
+use scrnn_run::failure::{Ending, Failure, Result};
+use scrnn_run::trained::Trained;
 
 /// Let a network that learned to reach touch the sphere
 ///
@@ -126,7 +126,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         &checkpoint.scaling,
         &noise,
         arguments.seed,
-        shared.instruction_set(),
+        &shared.engine()?,
     )?;
     let shift = arguments.shift_at.zip(arguments.to.map(|place| place.0));
     let samples = arguments.cycles as usize * CYCLE;
@@ -140,9 +140,9 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         Some(_) => Some(recording(&trained, arguments)?),
         None => None,
     };
-    let mut look = |glimpse: &Glimpse<'_>| -> Result<()> {
+    let mut look = |snapshot: &Snapshot<'_>| -> Result<()> {
         match &mut recording {
-            Some(recording) => Ok(recording.glimpse(glimpse)?),
+            Some(recording) => Ok(recording.snapshot(snapshot)?),
             None => Ok(()),
         }
     };

@@ -1,0 +1,22 @@
+//! Pages to look at: text, tables and figures in one file that needs nothing else, no network, no script, no font.
+//!
+//! A [`Page`] is built of [`Section`]s; [`Page::files`] gives the files that it consists of, each figure also as an SVG file
+//! and its numbers as CSV. Nothing here knows a network, and nothing opens a file.
+//!
+//! | feature | what it adds |
+//! |---|---|
+//! | `scenes` (default) | pictures of simulated scenes, see `Picture` |
+
+mod chart;
+mod page;
+#[cfg(feature = "scenes")]
+mod picture;
+mod table;
+mod words;
+
+pub use chart::{Chart, Mark, Panel, Series, Tone};
+pub use page::{Block, Drawing, FIGURES, Figure, PAGE, Page, Section, Sheet};
+#[cfg(feature = "scenes")]
+pub use picture::{Picture, Pictures, View};
+pub use table::Table;
+pub use words::in_words;

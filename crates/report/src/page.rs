@@ -1,0 +1,294 @@
+//! A page of sections, and its HTML.
+
+use std::fmt::Write as _;
+
+use super::chart::{Chart, on_white, themed};
+#[cfg(feature = "scenes")]
+use super::picture::Pictures;
+
+/// The page's file.
+pub const PAGE: &str = "report.html";
+/// Where each figure lies as SVG, and its numbers as CSV.
+pub const FIGURES: &str = "figures";
+
+const STYLE: &str = include_str!("page.css");
+
+/// All of a page.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Page {
+    /// Its title.
+    pub title: String,
+    /// What it is, in a sentence or two.
+    pub lede: String,
+    /// Its sections.
+    pub sections: Vec<Section>,
+}
+
+/// A part of a page under a heading.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Section {
+    /// The heading.
+    pub title: String,
+    /// What stands in it.
+    pub blocks: Vec<Block>,
+}
+
+/// A piece of a section.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Block {
+    /// A paragraph.
+    Text(String),
+    /// Text as it is, e.g. settings.
+    Verbatim(String),
+    /// A table.
+    Sheet(Sheet),
+    /// A figure.
+    Figure(Box<Figure>),
+}
+
+/// A table. Columns of numbers stand to the right; the words "met" and "missed" are coloured.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Sheet {
+    /// Stands above it.
+    pub caption: String,
+    /// Names of the columns.
+    pub head: Vec<String>,
+    /// Rows of cells.
+    pub rows: Vec<Vec<String>>,
+    /// Stands below it; may be empty.
+    pub note: String,
+}
+
+/// What a figure shows.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Drawing {
+    /// Numbers.
+    Chart(Chart),
+    /// Scenes.
+    #[cfg(feature = "scenes")]
+    Pictures(Pictures),
+}
+
+impl From<Chart> for Drawing {
+    fn from(chart: Chart) -> Self {
+        Self::Chart(chart)
+    }
+}
+
+#[cfg(feature = "scenes")]
+impl From<Pictures> for Drawing {
+    fn from(pictures: Pictures) -> Self {
+        Self::Pictures(pictures)
+    }
+}
+
+impl Drawing {
+    fn svg(&self, title: &str) -> String {
+        match self {
+            Self::Chart(chart) => chart.svg(title),
+            #[cfg(feature = "scenes")]
+            Self::Pictures(pictures) => pictures.svg(title),
+        }
+    }
+}
+
+/// A drawing with its words.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Figure {
+    /// Name of its files, without extension.
+    pub file: String,
+    /// What it shows, in a few words.
+    pub title: String,
+    /// How to read it.
+    pub caption: String,
+    /// What the thesis' figure shows; may be empty.
+    pub thesis: String,
+    /// The drawing.
+    pub drawing: Drawing,
+}
+
+impl Page {
+    /// The page as files: paths relative to its folder, and their texts. The page itself is the last, so that whoever writes
+    /// them in this order never leaves a page without its figures.
+    pub fn files(&self) -> impl Iterator<Item = (String, String)> {
+        let figures = self.figures().flat_map(|figure| {
+            let place = |ending: &str| format!("{FIGURES}/{}.{ending}", figure.file);
+            [(place("svg"), figure.file_svg()), (place("csv"), figure.csv())]
+        });
+        figures.chain(std::iter::once_with(|| (PAGE.to_owned(), self.html())))
+    }
+
+    /// All figures.
+    pub fn figures(&self) -> impl Iterator<Item = &Figure> {
+        self.sections.iter().flat_map(|section| &section.blocks).filter_map(|block| match block {
+            Block::Figure(figure) => Some(&**figure),
+            _ => None,
+        })
+    }
+
+    /// The page as HTML.
+    pub fn html(&self) -> String {
+        let mut out = String::new();
+        let (title, lede) = (escaped(&self.title), escaped(&self.lede));
+        write!(
+            out,
+            "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+             <meta name=\"color-scheme\" content=\"light dark\">\n<link rel=\"icon\" href=\"data:,\">\n\
+             <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>\n<p class=\"lede\">{lede}</p>\n<nav>"
+        )
+        .expect("a string takes all");
+        for (k, section) in self.sections.iter().enumerate() {
+            out += &format!("<a href=\"#s{k}\">{}</a>", escaped(&section.title));
+        }
+        out += "</nav>\n<main>\n";
+        for (k, section) in self.sections.iter().enumerate() {
+            out += &format!("<section>\n<h2 id=\"s{k}\">{}</h2>\n", escaped(&section.title));
+            section.blocks.iter().for_each(|block| block.html(&mut out));
+            out += "</section>\n";
+        }
+        out += "</main>\n</body>\n</html>\n";
+        out
+    }
+}
+
+impl Block {
+    fn html(&self, out: &mut String) {
+        match self {
+            Self::Text(text) => *out += &format!("<p>{}</p>\n", escaped(text)),
+            Self::Verbatim(text) => *out += &format!("<pre>{}</pre>\n", escaped(text)),
+            Self::Sheet(sheet) => sheet.html(out),
+            Self::Figure(figure) => figure.html(out),
+        }
+    }
+}
+
+impl Sheet {
+    fn html(&self, out: &mut String) {
+        let short = if self.rows.len() <= 14 { " short" } else { "" };
+        // A column of numbers stands to the right.
+        let numbers = |column: usize| self.rows.iter().all(|row| row.get(column).is_some_and(|cell| is_number(cell)));
+        *out += &format!("<div class=\"sheet{short}\"><table>\n<caption>{}</caption>\n", escaped(&self.caption));
+        if !self.head.is_empty() {
+            *out += "<thead><tr>";
+            for (column, cell) in self.head.iter().enumerate() {
+                let class = if numbers(column) { " class=\"n\"" } else { "" };
+                *out += &format!("<th scope=\"col\"{class}>{}</th>", escaped(cell));
+            }
+            *out += "</tr></thead>\n";
+        }
+        *out += "<tbody>\n";
+        for row in &self.rows {
+            *out += "<tr>";
+            for (column, cell) in row.iter().enumerate() {
+                let class = match cell.as_str() {
+                    "met" => " class=\"passed\"",
+                    "missed" => " class=\"failed\"",
+                    _ if numbers(column) => " class=\"n\"",
+                    _ => "",
+                };
+                *out += &format!("<td{class}>{}</td>", escaped(cell));
+            }
+            *out += "</tr>\n";
+        }
+        *out += "</tbody></table></div>\n";
+        if !self.note.is_empty() {
+            *out += &format!("<p class=\"note\">{}</p>\n", escaped(&self.note));
+        }
+    }
+}
+
+impl Figure {
+    /// The drawing as an SVG element whose colours follow the page's theme.
+    fn inline_svg(&self) -> String {
+        themed(self.drawing.svg(&self.title))
+    }
+
+    /// The drawing as a file of its own, in light colours on white.
+    pub fn file_svg(&self) -> String {
+        on_white(&self.drawing.svg(&self.title))
+    }
+
+    /// The numbers that it is drawn from.
+    pub fn csv(&self) -> String {
+        match &self.drawing {
+            Drawing::Chart(chart) => chart.csv(),
+            #[cfg(feature = "scenes")]
+            Drawing::Pictures(pictures) => pictures.csv(),
+        }
+    }
+
+    fn html(&self, out: &mut String) {
+        let Self { file, title, caption, thesis, .. } = self;
+        let name = escaped(file);
+        *out += &format!("<figure id=\"{name}\">\n<div class=\"plot\">\n{}</div>\n", self.inline_svg());
+        *out += &format!("<figcaption><b>{}</b>{}", escaped(title), escaped(caption));
+        if !thesis.is_empty() {
+            *out += &format!("<span class=\"thesis\">Thesis: {}</span>", escaped(thesis));
+        }
+        let folder = super::FIGURES;
+        *out += &format!("<span class=\"files\">{folder}/{0}.svg, {folder}/{0}.csv</span>", escaped(file));
+        *out += "</figcaption>\n</figure>\n";
+    }
+}
+
+/// Whether a cell is a number, with or without its spread or a percent sign, or a dash in the place of one.
+fn is_number(cell: &str) -> bool {
+    let number = cell.trim_end_matches([' ', '%']).split(" \u{b1} ").next().unwrap_or(cell);
+    !number.is_empty() && number.parse::<f64>().is_ok() || cell == "\u{2013}"
+}
+
+/// A text in which nothing is read as a tag.
+pub fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::chart::{Panel, Series, Tone};
+    use super::*;
+
+    #[test]
+    fn a_page_stands_on_its_own() {
+        let series = vec![Series::line("", Tone::Ours, vec![(0.0, 1.0), (1.0, 2.0)])];
+        let panels = vec![Panel::spanning("p", series)];
+        let chart = Chart { columns: 1, aspect: 2.0, x_label: "t".into(), y_label: String::new(), panels };
+        let figure = Figure {
+            file: "wave".into(),
+            title: "A <wave>".into(),
+            caption: "Read it.".into(),
+            thesis: "Fig. 1".into(),
+            drawing: chart.into(),
+        };
+        let sheet = Sheet {
+            caption: "T".into(),
+            head: vec!["a".into()],
+            rows: vec![vec!["1.5".into(), "met".into(), "0.1 \u{b1} 0.2".into()]],
+            note: String::new(),
+        };
+        let blocks = vec![
+            Block::Text("x < y".into()),
+            Block::Verbatim("a = 1".into()),
+            Block::Sheet(sheet),
+            Block::Figure(Box::new(figure)),
+        ];
+        let sections = vec![Section { title: "One & two".into(), blocks }];
+        let page = Page { title: "P".into(), lede: "L".into(), sections };
+        let html = page.html();
+        for part in [
+            "<title>A &lt;wave&gt;</title>",
+            "x &lt; y",
+            "One &amp; two",
+            "<td class=\"n\">1.5</td><td class=\"passed\">met</td><td class=\"n\">0.1",
+            "Thesis: Fig. 1",
+            "prefers-color-scheme:dark",
+        ] {
+            assert!(html.contains(part), "{part} is missing in\n{html}");
+        }
+        let beyond = html.replace("http://www.w3.org/2000/svg", "");
+        for part in ["http", "<script", "@import", "url(", "src="] {
+            assert!(!beyond.contains(part), "{part}");
+        }
+        assert_eq!(page.figures().count(), 1);
+    }
+}

@@ -1,0 +1,25 @@
+//! Numbers as people say them.
+
+use std::time::Duration;
+
+/// A duration as people say it: `59 s`, `1 min 15 s`, `1 h 02 min`.
+#[must_use]
+pub fn in_words(duration: Duration) -> String {
+    let seconds = duration.as_secs_f64().round().min(9e15) as u64;
+    match seconds {
+        0..60 => format!("{seconds} s"),
+        60..3600 => format!("{} min {:02} s", seconds / 60, seconds % 60),
+        _ => format!("{} h {:02} min", seconds / 3600, seconds % 3600 / 60),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn durations_read_as_people_say_them() {
+        let words = [0.4, 59.0, 75.0, 3723.0].map(|seconds| in_words(Duration::from_secs_f64(seconds)));
+        assert_eq!(words, ["0 s", "59 s", "1 min 15 s", "1 h 02 min"]);
+    }
+}

@@ -1,0 +1,56 @@
+//! What all studies have in common. A study implements [`Study`]; [`reproduce`] does the rest.
+//!
+//! ```text
+//! study --conditions x seeds--> jobs --side by side on the cores-->
+//!     train the job's networks -> evaluate, part by part, each kept -> findings, material
+//! all findings -> measures -> comparisons, tables -> verdicts -> metrics.json, tables, page with all material
+//! ```
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`study`] | the trait, a job, a trained network |
+//! | [`preset`] | the experiment files of a study's networks |
+//! | [`driver`] | from options to a page |
+//! | [`desk`], [`kept`] | what an evaluation is given; parts of evaluations in files |
+//! | [`results`] | what the jobs came to |
+//! | [`measure`], [`comparison`], [`verdict`], [`table`] | what is made of it |
+//! | [`metrics`], [`told`], [`overview`] | how it is told: as JSON, as text, as a page |
+//! | [`options`], [`context`], [`stop`] | what a reproduction is asked and given, and how it ends early |
+
+pub mod comparison;
+pub mod context;
+pub mod desk;
+pub mod driver;
+pub mod kept;
+pub mod measure;
+pub mod metrics;
+pub mod options;
+pub mod overview;
+pub mod preset;
+pub mod results;
+pub mod shapes;
+pub mod stop;
+pub mod study;
+pub mod table;
+#[cfg(test)]
+mod tests;
+pub mod told;
+pub mod verdict;
+
+pub use comparison::Comparison;
+pub use desk::Desk;
+pub use driver::reproduce;
+pub use measure::{Measure, Summary};
+pub use preset::Kind;
+pub use results::{JobResult, Results};
+pub use stop::Result;
+pub use study::{Condition, Job, Learned, Study};
+pub use table::{Cell, Column, Table};
+pub use verdict::Verdict;
+
+/// Added to a seed for data that were not learned.
+pub const HELD_OUT: u64 = 1_000_000;
+
+/// Added to a seed for the noise of closed loops: generators with the same seed draw the same numbers, and a closed loop
+/// should not meet the noise that it learned from.
+pub const CLOSED_LOOP: u64 = 2_000_000;

@@ -1,0 +1,164 @@
+//! What the types of the experiment file cannot rule out. A complaint names its key, so that the reader can point at it.
+
+use super::{Adam, Data, Experiment, Lbfgs, Momentum, Network, Output, ScalingChoice, TaskName, Training};
+
+/// A value that will not do.
+#[derive(Debug, PartialEq)]
+pub struct Complaint {
+    /// The parts of the key. A group is addressed by its name.
+    pub path: Vec<String>,
+    /// What is wrong.
+    pub message: String,
+    /// What would do.
+    pub needed: String,
+}
+
+type Check = Result<(), Complaint>;
+
+fn complaint(path: &[&str], message: impl Into<String>, needed: impl Into<String>) -> Check {
+    let path = path.iter().map(|&part| part.to_owned()).collect();
+    Err(Complaint { path, message: message.into(), needed: needed.into() })
+}
+
+/// Complains unless `ok`.
+fn must(ok: bool, path: &[&str], found: impl std::fmt::Display, needed: &str) -> Check {
+    if ok { Ok(()) } else { complaint(path, format!("`{}` is {found}", path.join(".")), needed) }
+}
+
+fn positive(path: &[&str], value: f64) -> Check {
+    must(value > 0.0 && value.is_finite(), path, value, "a number above 0")
+}
+
+fn not_negative(path: &[&str], value: f64) -> Check {
+    must(value >= 0.0 && value.is_finite(), path, value, "0 or a number above it")
+}
+
+/// Checks all values.
+pub fn check(experiment: &Experiment) -> Check {
+    let name = &experiment.name;
+    let folder = !name.is_empty() && !name.contains(['/', '\\']) && name != "." && name != "..";
+    must(folder, &["name"], format!("{name:?}"), "a name that a folder can have")?;
+    check_data(&experiment.data)?;
+    check_network(&experiment.network)?;
+    let Training { momentum, adam, lbfgs, .. } = &experiment.training;
+    of_library(momentum.as_ref().map_or(Ok(()), Momentum::check))?;
+    of_library(adam.as_ref().map_or(Ok(()), Adam::check))?;
+    of_library(lbfgs.as_ref().map_or(Ok(()), Lbfgs::check))?;
+    check_output(&experiment.output)
+}
+
+fn check_data(data: &Data) -> Check {
+    match (&data.task, &data.files) {
+        (None, None) => {
+            return complaint(
+                &["data"],
+                "there are no data to learn",
+                "task = \"sinusoid\" (or \"lissajous\", \"limit-cycle\", \"reach\"), or files = [\"mine.csv\"]",
+            );
+        }
+        (Some(_), Some(_)) => {
+            return complaint(&["data", "files"], "both `task` and `files` are given", "one of the two");
+        }
+        (None, Some(files)) => {
+            must(!files.is_empty(), &["data", "files"], "empty", "at least one file")?;
+            let of_task = [
+                ("sequences", data.sequences.is_some()),
+                ("steps", data.steps.is_some()),
+                ("seed", data.seed.is_some()),
+            ];
+            for (key, given) in of_task {
+                if given {
+                    return complaint(&["data", key], format!("`data.{key}` does not go with `files`"), "leave it out");
+                }
+            }
+        }
+        (Some(_), None) => {
+            let of_files = [
+                ("topic", data.topic.is_some()),
+                ("period", data.period.is_some()),
+                ("channels", data.channels.is_some()),
+            ];
+            for (key, given) in of_files {
+                if given {
+                    return complaint(&["data", key], format!("`data.{key}` does not go with `task`"), "leave it out");
+                }
+            }
+        }
+    }
+    if let Some(period) = data.period {
+        positive(&["data", "period"], period)?;
+    }
+    if let Some(channels) = &data.channels {
+        let path = ["data", "channels"];
+        must(!channels.is_empty(), &path, "empty", "at least one name")?;
+        let twice = channels.iter().enumerate().find(|(index, name)| channels[..*index].contains(name));
+        must(twice.is_none(), &path, "a list that names a channel twice", "each channel once")?;
+    }
+    if data.exact_positions.is_some() && data.task != Some(TaskName::Reach) {
+        let message = "`data.exact_positions` is given without the task \"reach\"";
+        return complaint(&["data", "exact_positions"], message, "leave it out");
+    }
+    must(data.sequences != Some(0), &["data", "sequences"], 0, "at least 1")?;
+    must(data.steps != Some(0), &["data", "steps"], 0, "at least 1 more than the delay")?;
+    let path = ["data", "scaling"];
+    match &data.scaling {
+        Some(ScalingChoice::Ranges(scaling)) => {
+            for &(low, high) in &scaling.ranges {
+                let found = format!("[{low}, {high}]");
+                must(
+                    low < high && low.is_finite() && high.is_finite(),
+                    &path,
+                    found,
+                    "ranges [low, high] with low < high",
+                )?;
+            }
+        }
+        Some(ScalingChoice::Constants(scaling)) => {
+            let equal = scaling.offset.len() == scaling.scale.len();
+            must(equal, &path, "two lists of different lengths", "one offset and one scale for each channel")?;
+            let fine = |value: &f64| value.is_finite() && *value != 0.0;
+            must(scaling.scale.iter().all(fine), &path, "not usable", "scales that are finite and not 0")?;
+            must(scaling.offset.iter().all(|value| value.is_finite()), &path, "not usable", "offsets that are finite")?;
+        }
+        Some(ScalingChoice::Named(_)) | None => {}
+    }
+    Ok(())
+}
+
+fn check_network(network: &Network) -> Check {
+    must(network.delay >= 1, &["network", "delay"], network.delay, "at least 1 step")?;
+    not_negative(&["network", "variance_floor"], network.variance_floor)?;
+    positive(&["network", "initial_state_variance"], network.initial_state_variance)?;
+    let groups = ["network", "groups"];
+    must(!network.groups.is_empty(), &groups, "empty", "at least one group of context units")?;
+    for (index, group) in network.groups.iter().enumerate() {
+        let key = |key| ["network", "groups", group.name.as_str(), key];
+        must(!group.name.is_empty(), &["network", "groups", "", "name"], "empty", "a name")?;
+        let twice = network.groups[..index].iter().any(|other| other.name == group.name);
+        must(!twice, &key("name"), format!("`{}` twice", group.name), "a name of its own for each group")?;
+        must(group.units >= 1, &key("units"), group.units, "at least 1 unit")?;
+        let tau = group.time_constant;
+        must(tau >= 1.0 && tau.is_finite(), &key("time_constant"), tau, "a number of steps, at least 1")?;
+    }
+    let driven = network.groups.iter().any(|group| group.drives_output);
+    must(driven, &groups, "without a group that drives the outputs", "drives_output = true in one group")
+}
+
+/// What the library refuses, with its key in the experiment file.
+fn of_library(checked: scrnn::error::Result<()>) -> Check {
+    use scrnn::error::Error;
+    match checked {
+        Ok(()) => Ok(()),
+        Err(Error::Setting { what, found, needed }) => {
+            let path: Vec<&str> = std::iter::once("training").chain(what.split('.')).collect();
+            must(false, &path, found, needed)
+        }
+        Err(other) => complaint(&["training"], other.to_string(), "settings that the library takes"),
+    }
+}
+
+fn check_output(output: &Output) -> Check {
+    must(output.checkpoint_every != Some(0), &["output", "checkpoint_every"], 0, "at least 1 epoch")?;
+    must(output.history_every != Some(0), &["output", "history_every"], 0, "at least 1 epoch")?;
+    not_negative(&["output", "checkpoint_seconds"], output.checkpoint_seconds)
+}

@@ -1,0 +1,155 @@
+//! From the file's types to the library's, with every default filled in.
+
+use std::path::{Path, PathBuf};
+
+use scrnn::dataset::Dataset;
+use scrnn::learning::{Optimiser, Plan};
+use scrnn::scaling::Scaling;
+use scrnn::topology::{Prediction, Topology};
+
+use super::{
+    Data, Experiment, OptimiserName, ScalingChoice, ScalingConstants, ScalingName, ScalingRanges, TaskName, Training,
+};
+use crate::failure::{Failure, Result};
+use scrnn_data::Selection;
+
+impl Experiment {
+    /// The same experiment with every value explicit. `folder` is where its file lies.
+    pub fn resolved(mut self, folder: &Path) -> Result<Self> {
+        self.data.resolve(folder)?;
+        self.training.resolve();
+        let a_thousandth = (self.training.epochs / 1000).max(1);
+        self.output.history_every.get_or_insert(a_thousandth);
+        Ok(self)
+    }
+
+    /// The network's topology on `channels` channels.
+    pub fn topology(&self, channels: usize) -> Result<Topology> {
+        let network = &self.network;
+        let prediction = if network.variance {
+            Prediction::MeanAndVariance { floor: network.variance_floor }
+        } else {
+            Prediction::Mean
+        };
+        Ok(Topology::new(channels, network.delay, network.groups.clone(), prediction)?)
+    }
+
+    /// How to learn. The experiment is a resolved one.
+    pub fn plan(&self) -> Plan {
+        let training = &self.training;
+        let optimiser = match training.optimiser {
+            OptimiserName::Momentum => Optimiser::Momentum(training.momentum.clone().unwrap_or_default()),
+            OptimiserName::Adam => Optimiser::Adam(training.adam.clone().unwrap_or_default()),
+        };
+        Plan::with(|it| {
+            it.epochs = training.epochs;
+            it.initial_state_variance = self.network.initial_state_variance;
+            it.optimiser = optimiser;
+            it.lbfgs = training.lbfgs.clone();
+            it.recompute = training.recompute;
+            it.on_divergence = training.on_divergence;
+        })
+    }
+}
+
+impl Data {
+    fn resolve(&mut self, folder: &Path) -> Result<()> {
+        if let Some(task) = self.task {
+            let (sequences, steps) = task.size();
+            self.sequences.get_or_insert(sequences);
+            self.steps.get_or_insert(steps);
+            self.seed.get_or_insert(1);
+            if task == TaskName::Reach {
+                self.exact_positions.get_or_insert(false);
+            }
+        }
+        for file in self.files.iter_mut().flatten() {
+            let path: PathBuf = folder.join(&*file);
+            *file = std::path::absolute(&path).map_err(|error| Failure::disk("find", &path, error))?;
+        }
+        let by_default = match self.task {
+            Some(task) if !task.has_robot() => ScalingName::None,
+            _ => ScalingName::Fit,
+        };
+        self.scaling.get_or_insert(ScalingChoice::Named(by_default));
+        Ok(())
+    }
+
+    /// Which part of its files is meant.
+    pub fn selection(&self) -> Selection {
+        Selection {
+            topics: self.topic.iter().cloned().collect(),
+            period: self.period,
+            channels: self.channels.clone(),
+            ..Selection::default()
+        }
+    }
+
+    /// The scaling that the experiment asks for, fitted to `data` if that is asked for.
+    pub fn scaling_for(&self, data: &Dataset) -> Result<Scaling> {
+        let scaling = self.chosen_scaling(data)?;
+        check_reach(data, &scaling)?;
+        Ok(scaling)
+    }
+
+    fn chosen_scaling(&self, data: &Dataset) -> Result<Scaling> {
+        let channels = data.channels().len();
+        let fits = |what: &str, count: usize| {
+            if count == channels {
+                return Ok(());
+            }
+            let message = format!("`data.scaling` has {count} {what}, the data have {channels} channels");
+            Err(Failure::input(message, format!("channels: {}", data.channels().join(", "))))
+        };
+        match &self.scaling {
+            Some(ScalingChoice::Named(ScalingName::Fit)) => Ok(Scaling::fit(data, Scaling::RANGE)),
+            Some(ScalingChoice::Ranges(ScalingRanges { ranges })) => {
+                fits("ranges", ranges.len())?;
+                Ok(Scaling::from_ranges(ranges, Scaling::RANGE))
+            }
+            Some(ScalingChoice::Constants(ScalingConstants { offset, scale })) => {
+                fits("offsets", offset.len())?;
+                Ok(Scaling::new(offset.clone(), scale.clone())?)
+            }
+            Some(ScalingChoice::Named(ScalingName::None)) | None => Ok(Scaling::identity(channels)),
+        }
+    }
+}
+
+/// Numbers up to this, and as little as its inverse apart, have variances that float64 can hold.
+const REACH: f64 = 1e150;
+
+/// Refuses channels whose samples are too large, or too close to each other, to compute their variances.
+fn check_reach(data: &Dataset, scaling: &Scaling) -> Result<()> {
+    for (i, name) in data.channels().iter().enumerate() {
+        let samples = || data.sequences().iter().flat_map(|s| s.values().iter().skip(i).step_by(data.channels().len()));
+        let largest = samples().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        let scale = scaling.scale()[i].abs();
+        let help = "bring the data to other units, or leave the channel out with `channels` in [data]";
+        if largest > REACH {
+            return Err(Failure::input(format!("channel {name} reaches {largest:e}; needed: at most {REACH:e}"), help));
+        }
+        if !(1.0 / REACH..=REACH).contains(&scale) || samples().any(|&x| scaling.to_scaled(i, x).abs() > REACH) {
+            let message =
+                format!("the samples of channel {name} cannot be scaled: a factor of {scale:e} would be needed");
+            return Err(Failure::input(message, help));
+        }
+    }
+    Ok(())
+}
+
+impl Training {
+    /// Keeps the table of the optimiser that is used, and fills it in.
+    fn resolve(&mut self) {
+        match self.optimiser {
+            OptimiserName::Momentum => {
+                self.momentum.get_or_insert_default();
+                self.adam = None;
+            }
+            OptimiserName::Adam => {
+                self.adam.get_or_insert_default();
+                self.momentum = None;
+            }
+        }
+    }
+}

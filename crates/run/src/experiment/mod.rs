@@ -1,0 +1,223 @@
+//! The experiment file: everything that decides what a training comes to.
+//!
+//! The types here are the file's format. [`read()`] turns a file and `--set` options into an [`Experiment`], checked, with
+//! every default filled in; the run folder keeps it in that form.
+
+mod checks;
+mod conversion;
+mod difference;
+mod overrides;
+mod reading;
+#[cfg(test)]
+mod reading_tests;
+
+use std::path::PathBuf;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub use difference::{Difference, differences};
+pub use overrides::Override;
+pub use reading::{read, read_text};
+pub use scrnn::learning::{Adam, AdaptiveRate, Lbfgs, Momentum, OnDivergence, PriorStep};
+pub use scrnn::topology::Group;
+pub use scrnn_tasks::TaskName;
+
+/// What to learn, with which network and how.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "scrnn experiment")]
+pub struct Experiment {
+    /// The experiment's name. The run folder is called after it.
+    pub name: String,
+    /// Seed of the initial weights and biases.
+    #[serde(default = "one")]
+    pub seed: u64,
+    /// The sequences to learn.
+    pub data: Data,
+    /// The network.
+    pub network: Network,
+    /// How the network learns.
+    pub training: Training,
+    /// What is written while it learns. Has no influence on what is learned.
+    #[serde(default)]
+    pub output: Output,
+}
+
+fn one() -> u64 {
+    1
+}
+
+/// The sequences to learn: either a task of the thesis or files.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Data {
+    /// A task of the thesis. Its data are made anew for each run, the same for the same seed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub task: Option<TaskName>,
+    /// Number of sequences of the task. Default: as in the thesis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sequences: Option<usize>,
+    /// Samples in each sequence of the task. Default: as in the thesis, 1000, or 180 for "reach".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub steps: Option<usize>,
+    /// Seed of the task's noise. Default 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seed: Option<u64>,
+    /// For the task "reach": whether the object lies exactly at its three positions, instead of being placed up to 10 mm
+    /// off for each sequence. Default false.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exact_positions: Option<bool>,
+    /// Files to read, relative to the experiment file: .csv, .txt, .npy, .npz or .mcap. The sequences of all of them are
+    /// learned together.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub files: Option<Vec<PathBuf>>,
+    /// The topic whose messages are samples, in .mcap files. Default: /sensed, or the only one whose messages are JSON.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub topic: Option<String>,
+    /// Seconds between samples, to which the messages of .mcap files are brought. Default: as they are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub period: Option<f64>,
+    /// Names of the channels to learn, in this order. Default: all that the files have.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub channels: Option<Vec<String>>,
+    /// How samples are brought into the reach of the mean units, which is -1 to 1. Default: "fit" for files and robots,
+    /// "none" for other tasks.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scaling: Option<ScalingChoice>,
+}
+
+/// How samples are scaled.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(
+    untagged,
+    expecting = "scaling is one of \"none\", \"fit\", { ranges = [[low, high], ...] } or { offset = [...], scale = [...] }"
+)]
+pub enum ScalingChoice {
+    /// By name.
+    Named(ScalingName),
+    /// Each channel's range is mapped to -0.8 ... 0.8.
+    Ranges(ScalingRanges),
+    /// scaled = (raw - offset) * scale
+    Constants(ScalingConstants),
+}
+
+/// A scaling that needs no numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ScalingName {
+    /// Samples are used as they are.
+    None,
+    /// Each channel's smallest and largest sample are mapped to -0.8 and 0.8.
+    Fit,
+}
+
+/// One range for each channel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ScalingRanges {
+    /// `[low, high]` for each channel.
+    pub ranges: Vec<(f64, f64)>,
+}
+
+/// Two constants for each channel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ScalingConstants {
+    /// The raw value that becomes 0, for each channel.
+    pub offset: Vec<f64>,
+    /// The factor for each channel.
+    pub scale: Vec<f64>,
+}
+
+/// The network: one context group makes it a CTRNN, a fast and a slow one an MTRNN.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Network {
+    /// The delay xi: the network predicts the sample that many steps ahead.
+    #[serde(default = "one_step")]
+    pub delay: usize,
+    /// Whether the variance is predicted too; `false` makes it a conventional CTRNN or MTRNN.
+    #[serde(default = "yes")]
+    pub variance: bool,
+    /// Added to each predicted variance. The thesis has none: 0.
+    #[serde(default)]
+    pub variance_floor: f64,
+    /// Variance of the prior over initial states (2.15): large lets each sequence find its own, small keeps them together.
+    #[serde(default = "unit")]
+    pub initial_state_variance: f64,
+    /// The context units.
+    pub groups: Vec<Group>,
+}
+
+fn recover() -> OnDivergence {
+    OnDivergence::Recover
+}
+
+fn one_step() -> usize {
+    1
+}
+
+fn yes() -> bool {
+    true
+}
+
+fn unit() -> f64 {
+    1.0
+}
+
+/// How the network learns.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Training {
+    /// How often all sequences are seen. Each time is one update, but for Adam in batches.
+    pub epochs: u64,
+    /// The rule of ascent. Only the table of the same name is used.
+    pub optimiser: OptimiserName,
+    /// Saves memory on long sequences: states are not all kept but computed again, which takes a third more time. What is
+    /// learned stays the same to the bit.
+    #[serde(default)]
+    pub recompute: bool,
+    /// What to do when training leaves its course.
+    #[serde(default = "recover")]
+    pub on_divergence: OnDivergence,
+    /// Options of "momentum".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub momentum: Option<Momentum>,
+    /// Options of "adam".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub adam: Option<Adam>,
+    /// Lets L-BFGS make the last epochs; an empty table turns it on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lbfgs: Option<Lbfgs>,
+}
+
+/// The rules of ascent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum OptimiserName {
+    /// The thesis' gradient ascent with a momentum term (2.17-2.19).
+    Momentum,
+    /// Adam with warm-up, cosine decay and norm clipping.
+    Adam,
+}
+
+/// What is written while the network learns.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Output {
+    /// Epochs between checkpoints. Default: by time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub checkpoint_every: Option<u64>,
+    /// Seconds between checkpoints where `checkpoint_every` is not given.
+    pub checkpoint_seconds: f64,
+    /// Epochs between rows of history.csv. Default: a thousandth of all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub history_every: Option<u64>,
+}
+
+impl Default for Output {
+    fn default() -> Self {
+        Self { checkpoint_every: None, checkpoint_seconds: 10.0, history_every: None }
+    }
+}

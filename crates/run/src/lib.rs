@@ -1,0 +1,33 @@
+//! Trainings in folders: from an experiment file and data to a network that other commands find again.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`experiment`] | the experiment file: its types, how it is read, checked, overridden and compared |
+//! | [`source`] | the sequences of an experiment, made or read, and their fingerprint |
+//! | [`training`] | one training, from a resolved experiment to a run folder: begun, gone on with, or begun anew |
+//! | [`verdict`] | what a training came to, in words and as JSON |
+//! | [`run_folder`], [`history`], [`notes`] | what a training leaves behind |
+//! | [`trained`], [`channels`] | a trained network as it is found again, and new data brought to its channels by name |
+//! | [`assessment`], [`truth`] | how well it predicts, beside simple models and what is known of the noise |
+//! | [`messages`], [`interrupt`] | how news and progress leave, and how a person's wish to stop comes in |
+//! | [`failure`] | what ends a request early, and with which exit code |
+//!
+//! Nothing here knows a terminal or a command line: progress and messages are handed in.
+
+pub mod assessment;
+pub mod channels;
+pub mod experiment;
+pub mod failure;
+pub mod history;
+pub mod interrupt;
+pub mod messages;
+pub mod notes;
+pub mod run_folder;
+pub mod source;
+pub mod trained;
+pub mod training;
+pub mod truth;
+pub mod verdict;
+
+mod recorder;
+mod resume;

@@ -1,0 +1,37 @@
+//! How news and progress leave: whoever calls hands in where they go.
+
+use std::fmt;
+
+use scrnn::learning::EpochReport;
+
+/// Takes sentences for a person: warnings, and what is going on.
+pub trait Messages: Sync {
+    /// Says one, which may have several lines.
+    fn say(&self, message: &str);
+}
+
+/// Watches one training.
+pub trait Progress: fmt::Debug {
+    /// An epoch is over.
+    fn epoch(&mut self, report: &EpochReport);
+
+    /// Something worth a sentence happened to this training.
+    fn say(&self, message: &str);
+
+    /// Nothing more will come.
+    fn finish(&self) {}
+}
+
+/// Says nothing and shows nothing.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Silent;
+
+impl Messages for Silent {
+    fn say(&self, _message: &str) {}
+}
+
+impl Progress for Silent {
+    fn epoch(&mut self, _report: &EpochReport) {}
+
+    fn say(&self, _message: &str) {}
+}

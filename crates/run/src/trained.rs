@@ -1,0 +1,116 @@
+//! A trained network as the commands take it: a run folder or a checkpoint file.
+
+use std::path::{Path, PathBuf};
+
+use scrnn::checkpoint::Checkpoint;
+use scrnn::dataset::Dataset;
+use scrnn::network::Network;
+use serde::Deserialize;
+
+use crate::channels;
+use crate::experiment::Experiment;
+use crate::failure::{Failure, Result};
+use crate::notes::Notes;
+use crate::run_folder::{BEST, CHECKPOINT};
+use crate::source;
+use scrnn_data::Selection;
+
+/// Scaled samples from here on are refused: predictions lie between -1 and 1.
+const TOO_FAR: f64 = 1e12;
+
+/// A checkpoint with what the program noted in it.
+#[derive(Debug)]
+pub struct Trained {
+    /// The file that was read.
+    pub path: PathBuf,
+    /// What it holds.
+    pub checkpoint: Checkpoint,
+    /// The program's own notes, unless something else wrote the checkpoint.
+    pub notes: Option<Notes>,
+    network: Network,
+}
+
+impl Trained {
+    /// Reads a run folder's checkpoint (or its best one) or a checkpoint file.
+    pub fn open(path: &Path, best: bool) -> Result<Self> {
+        let file = if path.is_dir() {
+            let name = if best { BEST } else { CHECKPOINT };
+            let file = path.join(name);
+            if !file.exists() {
+                let message = format!("{} holds no {name}", path.display());
+                return Err(Failure::input(message, "give the folder that `scrnn train` wrote, or a checkpoint file"));
+            }
+            file
+        } else {
+            if best {
+                let message = format!("--best needs a run folder, {} is a file", path.display());
+                return Err(Failure::input(message, format!("give the folder that holds {BEST}")));
+            }
+            path.to_owned()
+        };
+        let checkpoint = read_checkpoint(&file)?;
+        let notes = Notes::of(&checkpoint);
+        let network = Network::new(checkpoint.topology.clone(), checkpoint.parameters.clone())?;
+        Ok(Self { path: file, checkpoint, notes, network })
+    }
+
+    /// The network itself.
+    pub fn network(&self) -> Network {
+        self.network.clone()
+    }
+
+    /// Which part of its files it learned, where that is known.
+    pub fn selection(&self) -> Option<Selection> {
+        let experiment = Experiment::deserialize(&self.notes.as_ref()?.experiment).ok()?;
+        Some(experiment.data.selection())
+    }
+
+    /// The sequences that it learned, made (by simulated robots: on so many threads) or read again.
+    pub fn learned_data(&self, threads: usize) -> Result<Dataset> {
+        let other = "say with --data which sequences to use";
+        let notes = self.notes.as_ref().ok_or_else(|| {
+            Failure::input(format!("{} does not say what it was trained on", self.path.display()), other)
+        })?;
+        let experiment = Experiment::deserialize(&notes.experiment).map_err(|error| {
+            Failure::input(format!("the experiment in {} cannot be read: {error}", self.path.display()), other)
+        })?;
+        let data = source::load(&experiment.data, threads)?.data;
+        if source::digest(&data) != notes.data.digest {
+            return Err(Failure::input("the data changed since the network learned them", other));
+        }
+        Ok(data)
+    }
+
+    /// `data`, from the file at `path`, on the channels that were learned and in their order (see [`channels::matched`]),
+    /// checked to be numbers that the network can be given.
+    ///
+    /// # Errors
+    /// [`Failure::Input`] for channels that do not match, and for samples far outside of what was learned.
+    pub fn fitted(&self, data: Dataset, path: &Path) -> Result<Dataset> {
+        let learned = &self.checkpoint.channels;
+        let data = channels::matched(data, learned, &path.display().to_string())?;
+        let scaled = self.checkpoint.scaling.apply(&data);
+        let n = learned.len();
+        for sequence in scaled.sequences() {
+            if let Some(at) = sequence.values().iter().position(|value| value.abs() >= TOO_FAR || value.is_nan()) {
+                let (name, step, channel) = (&sequence.name, at / n + 1, &learned[at % n]);
+                let message = format!(
+                    "{}: sequence {name}, step {step}, channel {channel} lies {:e} times as far out as anything that was learned",
+                    path.display(),
+                    sequence.values()[at].abs()
+                );
+                return Err(Failure::input(message, "are these data in the units of those that were learned?"));
+            }
+        }
+        Ok(data)
+    }
+}
+
+/// Reads a checkpoint file.
+pub fn read_checkpoint(path: &Path) -> Result<Checkpoint> {
+    let bytes = std::fs::read(path).map_err(|error| Failure::disk("read", path, error))?;
+    Checkpoint::from_bytes(&bytes).map_err(|error| {
+        let message = format!("{} is not a checkpoint that this version reads: {error}", path.display());
+        Failure::input(message, "give a run folder, or a .safetensors file that `scrnn train` wrote")
+    })
+}

@@ -1,0 +1,188 @@
+//! One training, from a resolved experiment to a run folder: begun, gone on with, or begun anew.
+
+use std::path::Path;
+
+use scrnn::dataset::Dataset;
+use scrnn::engine::Engine;
+use scrnn::initialization::initialize;
+use scrnn::learning::{Learner, Outcome};
+use scrnn::scaling::Scaling;
+use scrnn::topology::Topology;
+
+use crate::experiment::Experiment;
+use crate::failure::{Failure, Result};
+use crate::history::History;
+use crate::interrupt::Interrupt;
+use crate::messages::{Messages, Progress};
+use crate::notes::{DataNotes, Notes, Score, learned_part};
+use crate::recorder::{Record, Recorder};
+use crate::resume;
+use crate::run_folder::{BEST, CHECKPOINT, EXPERIMENT, HISTORY, RunFolder};
+use crate::source::{self, Source};
+use crate::trained::read_checkpoint;
+
+/// What to do with a run that is in the folder already.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Found {
+    /// Leave it, and fail.
+    Refuse,
+    /// Go on with it; without one, start.
+    GoOn,
+    /// Throw it away.
+    Overwrite,
+}
+
+/// A training that came to an end.
+#[derive(Debug)]
+pub struct Training {
+    /// The run folder.
+    pub run: String,
+    /// How it ended.
+    pub outcome: Outcome,
+    /// The learner, as it was left.
+    pub learner: Learner,
+    /// What it learned from.
+    pub source: Source,
+    /// Between the data's units and the network's.
+    pub scaling: Scaling,
+    /// How the network does, if its last epoch was evaluated.
+    pub score: Option<Score>,
+    /// The best epoch.
+    pub best: Option<Score>,
+    /// Seconds of training, those of earlier processes included.
+    pub seconds: f64,
+}
+
+/// Trains, and keeps the run folder up to date.
+///
+/// # Errors
+/// [`Failure::Refused`] if a run is there and may not be gone on with; whatever is wrong with experiment or data.
+pub fn train(
+    experiment: &Experiment,
+    (path, wanted): (&Path, Found),
+    (engine, interrupt): (&Engine, &Interrupt),
+    progress: Box<dyn Progress>,
+    messages: &dyn Messages,
+) -> Result<Training> {
+    let source = source::load(&experiment.data, engine.threads())?;
+    let topology = experiment.topology(source.data.channels().len())?;
+    source.data.check_for(&topology)?;
+    refuse_unbounded(&source.data, &topology)?;
+    let scaling = experiment.data.scaling_for(&source.data)?;
+    let scaled = scaling.apply(&source.data);
+    warn_out_of_reach(&scaled, messages);
+
+    let (network, initial_states) = initialize(&topology, scaled.sequences().len(), experiment.seed);
+    let mut learner = Learner::new(network, initial_states, &scaled, experiment.plan(), engine)?;
+    let notes = Notes {
+        experiment: learned_part(experiment),
+        data: DataNotes {
+            digest: source::digest(&source.data),
+            lengths: source.data.sequences().iter().map(|sequence| sequence.len()).collect(),
+        },
+        score: None,
+        best: None,
+    };
+
+    let run = RunFolder::open(path)?;
+    let found = run.file(CHECKPOINT).exists();
+    if found && wanted == Found::Refuse {
+        return Err(Failure::refused(
+            format!("{} already holds a run", path.display()),
+            "--resume goes on with it, --overwrite throws it away, --out RUN writes elsewhere",
+        ));
+    }
+    let (notes, history) = if found && wanted == Found::GoOn {
+        let checkpoint = read_checkpoint(&run.file(CHECKPOINT))?;
+        let notes = resume::check(&checkpoint, notes, experiment, path)?;
+        learner = Learner::resume(&checkpoint, &scaled, experiment.plan(), engine)?;
+        messages.say(&format!("going on with {} at epoch {}", path.display(), learner.epoch()));
+        write_experiment(&run, experiment)?;
+        (notes, History::go_on(&run, learner.epoch())?)
+    } else {
+        // In this order: a kill in between leaves a folder without a run rather than parts of two.
+        for name in [CHECKPOINT, BEST, HISTORY] {
+            run.remove(name)?;
+        }
+        write_experiment(&run, experiment)?;
+        (notes, History::start(&run)?)
+    };
+    let record = Record {
+        scaling: scaling.clone(),
+        channels: scaled.channels().to_vec(),
+        sequences: scaled.sequences().iter().map(|sequence| sequence.name.clone()).collect(),
+        first_inputs: first_inputs(&scaled, topology.delay()),
+    };
+
+    let mut recorder = Recorder::new(&run, record, notes, history, (progress, messages), experiment, interrupt);
+    if found && wanted == Found::GoOn {
+        recorder.take_up_best(&learner);
+    } else {
+        recorder.save(&learner)?;
+    }
+    let outcome = learner.run(&mut recorder);
+    recorder.finish(&learner, &outcome)?;
+    let (score, best, seconds) = (recorder.score_of(learner.epoch()), recorder.best(), recorder.seconds());
+    let run = run.path().display().to_string();
+    Ok(Training { run, outcome, learner, source, scaling, score, best, seconds })
+}
+
+/// Channels whose predicted samples are all the same.
+pub fn still_channels(data: &Dataset, delay: usize) -> Vec<String> {
+    let n = data.channels().len();
+    let predicted = || data.sequences().iter().filter_map(|sequence| sequence.values().get(delay * n..));
+    let still = |i: usize| {
+        let mut samples = predicted().flat_map(|values| values.chunks_exact(n)).map(|sample| sample[i]);
+        let first = samples.next();
+        samples.all(|sample| Some(sample) == first)
+    };
+    // One sample says nothing about change.
+    let several = predicted().map(|values| values.len() / n).sum::<usize>() > 1;
+    (0..n).filter(|&i| several && still(i)).map(|i| data.channels()[i].clone()).collect()
+}
+
+/// A channel that never changes lets its variance fall for ever: refuses it where no floor stops that.
+fn refuse_unbounded(data: &Dataset, topology: &Topology) -> Result<()> {
+    if !topology.has_variance() || topology.variance_floor() > 0.0 {
+        return Ok(());
+    }
+    let still = still_channels(data, topology.delay());
+    let Some(first) = still.first() else { return Ok(()) };
+    let what = if still.len() == 1 {
+        format!("channel {first} never changes")
+    } else {
+        format!("channels {} never change", still.join(", "))
+    };
+    Err(Failure::input(
+        format!("{what}: without noise its likelihood has no bound, and its variance would fall until numbers end"),
+        "leave it out with `channels` in [data], or set `variance_floor` in [network], e.g. to 1e-4",
+    ))
+}
+
+fn write_experiment(run: &RunFolder, experiment: &Experiment) -> Result<()> {
+    let text = toml::to_string(experiment).expect("the experiment came from such a file");
+    let head = "# Written by scrnn train: the experiment with every value explicit.\n";
+    run.write(EXPERIMENT, format!("{head}{text}").as_bytes())
+}
+
+/// The first xi samples of each sequence: what a closed loop starts from.
+fn first_inputs(scaled: &Dataset, delay: usize) -> Vec<f64> {
+    let values = delay * scaled.channels().len();
+    scaled.sequences().iter().flat_map(|sequence| &sequence.values()[..values]).copied().collect()
+}
+
+/// The mean units reach from -1 to 1: samples beyond cannot be predicted.
+fn warn_out_of_reach(scaled: &Dataset, messages: &dyn Messages) {
+    for (i, name) in scaled.channels().iter().enumerate() {
+        let samples =
+            scaled.sequences().iter().flat_map(|sequence| sequence.values().chunks_exact(scaled.channels().len()));
+        let beyond = samples.map(|sample| sample[i]).filter(|value| value.abs() >= 1.0).count();
+        if beyond > 0 {
+            let total = scaled.total_samples();
+            messages.say(&format!(
+                "warning: {beyond} of {total} samples of channel {name} lie outside of -1 to 1, where the network's \
+                 predictions end; `scaling = \"fit\"` in [data] brings them inside"
+            ));
+        }
+    }
+}
