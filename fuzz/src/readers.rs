@@ -10,7 +10,7 @@ use scrnn_data::{Selection, parse_as};
 /// A data file of this name. With `resampled`, a recording's joints every twentieth of a second.
 pub fn data(name: &str, bytes: &[u8], resampled: bool) {
     let selection = match resampled {
-        true => Selection { topic: Some("/joint_states".to_owned()), period: Some(0.05), channels: None },
+        true => Selection { topics: vec!["/joint_states".to_owned()], period: Some(0.05), ..Selection::default() },
         false => Selection::default(),
     };
     match parse_as(Path::new(name), bytes, &selection) {

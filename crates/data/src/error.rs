@@ -5,6 +5,8 @@ use std::path::Path;
 
 use miette::{Diagnostic, NamedSource, SourceSpan};
 
+use crate::budget::OverBudget;
+
 /// A data file that cannot be read or written.
 #[derive(Debug, thiserror::Error, Diagnostic)]
 pub enum FileError {
@@ -25,10 +27,22 @@ pub enum FileError {
 
     /// The extension does not tell a format.
     #[error("the name of {path} does not tell what the file holds")]
-    #[diagnostic(help("data files end in .csv, .txt, .dat, .tsv, .npy, .npz or .mcap"))]
+    #[diagnostic(help("data files end in {known}"))]
     Extension {
         /// The file.
         path: String,
+        /// The extensions that are known.
+        known: String,
+    },
+
+    /// A pattern or a folder without data files.
+    #[error("{what}: {pattern}")]
+    #[diagnostic(help("check the spelling; paths start from the folder of the experiment file, or the current one"))]
+    NoMatch {
+        /// The pattern.
+        pattern: String,
+        /// What is missing.
+        what: &'static str,
     },
 
     /// A file that was to hold text.
@@ -72,7 +86,7 @@ pub enum FileError {
         problem: ArrayProblem,
         /// What to do.
         #[help]
-        help: Option<&'static str>,
+        help: Option<String>,
     },
 
     /// An array with a value that is NaN or infinite.
@@ -101,6 +115,13 @@ pub enum FileError {
         source: zip::result::ZipError,
     },
 
+    /// An archive whose members share bytes, so that it would unpack to far more than it has.
+    #[error("{path} is a damaged archive: its members overlap")]
+    Overlap {
+        /// The file.
+        path: String,
+    },
+
     /// A recording that cannot be read.
     #[error("{path}: {problem}")]
     Recording {
@@ -113,14 +134,66 @@ pub enum FileError {
         help: Option<String>,
     },
 
-    /// An option that makes sense for recordings only.
-    #[error("{path} is no recording; `{option}` goes with .mcap files only")]
+    /// An option that makes sense for other formats only.
+    #[error("{path} is read as {format}; `{option}` goes with {known} only")]
     #[diagnostic(help("leave it out"))]
-    NotARecording {
+    UnknownOption {
         /// The file.
         path: String,
+        /// What kind of file it is.
+        format: &'static str,
         /// The option.
         option: &'static str,
+        /// Extensions of the formats that know it.
+        known: String,
+    },
+
+    /// A file that would fill the memory.
+    #[error("{path}: {problem}")]
+    #[diagnostic(help("it may be damaged; if it is not, unpack it or cut it into several files"))]
+    OverBudget {
+        /// The file.
+        path: String,
+        /// How much it would take.
+        problem: OverBudget,
+    },
+
+    /// Times that are not even, or cannot be made so.
+    #[error("{path}, sequence {sequence}: {found}; steps are equally spaced")]
+    #[diagnostic(help("{help}"))]
+    Times {
+        /// The file.
+        path: String,
+        /// The sequence.
+        sequence: String,
+        /// What was found.
+        found: String,
+        /// What to do.
+        help: String,
+    },
+
+    /// A period for data of which nobody knows when they were taken.
+    #[error("{path} does not tell when its samples were taken, so they cannot be brought to a period")]
+    #[diagnostic(help("leave `period` out, or add a column `time` in seconds"))]
+    NoClock {
+        /// The file.
+        path: String,
+    },
+
+    /// Files whose channels do not go together.
+    #[error("the channels of {path} are {found}; those of {first} are {needed}")]
+    #[diagnostic(help("{help}"))]
+    ChannelsDiffer {
+        /// The file that differs.
+        path: String,
+        /// Its channels.
+        found: String,
+        /// The first file.
+        first: String,
+        /// The channels of that.
+        needed: String,
+        /// What to do.
+        help: String,
     },
 
     /// A channel that is asked for, but not there.
@@ -244,6 +317,13 @@ pub enum LineProblem {
         first: usize,
     },
 
+    /// What could mean several things.
+    #[error("{what}")]
+    Ambiguous {
+        /// What it could be, and what to do.
+        what: &'static str,
+    },
+
     /// Something else than a number.
     #[error("`{found}` in column {column} is not a number")]
     NotANumber {
@@ -272,6 +352,7 @@ impl LineProblem {
     fn label(&self) -> String {
         match self {
             Self::FieldCount { found, needed, .. } => format!("{found} instead of {needed} fields"),
+            Self::Ambiguous { .. } => "this line".to_owned(),
             Self::NotANumber { .. } => "not a number".to_owned(),
             Self::NotFinite { .. } => "not a finite number".to_owned(),
         }
@@ -418,7 +499,7 @@ pub enum ArrayProblem {
     Header(&'static str),
 
     /// Elements that are not numbers.
-    #[error("an array of type `{found}`; needed: floats of 4 or 8 bytes, integers or booleans")]
+    #[error("an array of type `{}`; needed: floats, integers or booleans", super::excerpt::shortened(found))]
     Type {
         /// The type as numpy writes it.
         found: String,
@@ -433,6 +514,47 @@ pub enum ArrayProblem {
         needed: &'static str,
     },
 
+    /// More channels than steps: the axes may be another way round.
+    #[error("an array of shape {shape} would be {channels} channels of {steps} steps; it may be the other way round")]
+    MoreChannels {
+        /// The shape as numpy writes it.
+        shape: String,
+        /// Channels.
+        channels: usize,
+        /// Steps.
+        steps: usize,
+    },
+
+    /// The first axis looks like the steps of one recording.
+    #[error("an array of shape {shape} may be one recording: its values go on smoothly along the first axis")]
+    FirstAxisIsTime {
+        /// The shape as numpy writes it.
+        shape: String,
+    },
+
+    /// Axes that do not fit.
+    #[error("`axes = \"{axes}\"` does not fit {found}")]
+    Axes {
+        /// What was asked for.
+        axes: String,
+        /// What there is.
+        found: String,
+    },
+
+    /// An array that is asked for, but not there.
+    #[error("there is no array `{found}`")]
+    NoArray {
+        /// What is asked for.
+        found: String,
+    },
+
+    /// Arrays that do not go together.
+    #[error("its arrays differ in lengths and channels: {found}")]
+    Lengths {
+        /// The arrays with their shapes.
+        found: String,
+    },
+
     /// More or fewer bytes than the shape says.
     #[error("the array's header promises {promised} bytes, but {held} follow")]
     Size {
@@ -440,14 +562,5 @@ pub enum ArrayProblem {
         promised: String,
         /// Bytes that are there.
         held: usize,
-    },
-
-    /// Sequences on different channels.
-    #[error("{found} channels; needed: {needed}, as in the first array")]
-    Channels {
-        /// Channels of this array.
-        found: usize,
-        /// Channels of the first.
-        needed: usize,
     },
 }

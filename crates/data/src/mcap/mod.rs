@@ -6,9 +6,9 @@
 
 use std::collections::BTreeMap;
 
-use scrnn::dataset::Dataset;
-
-use super::{FileError, RecordingProblem, Selection, collect};
+use crate::format::Source;
+use crate::samples::Samples;
+use crate::{FileError, RecordingProblem, Selection};
 use container::{Channel, Message, messages};
 use resampling::Series;
 
@@ -23,7 +23,8 @@ const SEQUENCE_TOPIC: &str = "/sequence";
 const SENSED_TOPIC: &str = "/sensed";
 
 /// Reads the file called `path`.
-pub fn read(path: &str, bytes: &[u8], selection: &Selection) -> Result<Dataset, FileError> {
+pub fn read(source: &Source<'_>, selection: &Selection) -> Result<Samples, FileError> {
+    let (path, bytes) = (source.name(), &source.bytes()?);
     let wrong = |topic: Option<&str>, problem| FileError::Recording {
         path: match topic {
             Some(topic) => format!("{path}, topic {topic}"),
@@ -33,9 +34,10 @@ pub fn read(path: &str, bytes: &[u8], selection: &Selection) -> Result<Dataset, 
         problem: Box::new(problem),
     };
     let topics = topics(bytes).map_err(|problem| wrong(None, problem))?;
-    let topic = choose(&topics, selection.topic.as_deref()).map_err(|problem| wrong(None, problem))?;
+    let topic =
+        choose(&topics, selection.topics.first().map(String::as_str)).map_err(|problem| wrong(None, problem))?;
     let (channels, sequences) = sequences(bytes, topic, selection).map_err(|problem| wrong(Some(topic), problem))?;
-    collect(path, channels, sequences)
+    Ok(Samples { period: selection.period, ..Samples::named(channels, sequences) })
 }
 
 /// What to do about a problem.
@@ -121,9 +123,9 @@ enum Entry {
 }
 
 /// The topic's channels, and its samples sequence by sequence.
-type Samples = (Vec<String>, Vec<(String, Vec<f64>)>);
+type Sequences = (Vec<String>, Vec<(String, Vec<f64>)>);
 
-fn sequences(bytes: &[u8], topic: &str, selection: &Selection) -> Result<Samples, RecordingProblem> {
+fn sequences(bytes: &[u8], topic: &str, selection: &Selection) -> Result<Sequences, RecordingProblem> {
     let mut columns = Columns::new(selection);
     let mut entries: Vec<(u64, Entry)> = Vec::new();
     messages(bytes, |message| {

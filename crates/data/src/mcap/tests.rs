@@ -43,17 +43,21 @@ pub fn some_joints() -> Vec<u8> {
     recording(plain(), &ten())
 }
 
+fn read_bytes(path: &str, bytes: &[u8], selection: &Selection) -> Result<scrnn::dataset::Dataset, FileError> {
+    crate::parse_as(std::path::Path::new(path), bytes, selection)
+}
+
 fn select(topic: Option<&str>, period: Option<f64>, channels: Option<&[&str]>) -> Selection {
     let channels = channels.map(|names| names.iter().map(|&name| name.to_owned()).collect());
-    Selection { topic: topic.map(str::to_owned), period, channels }
+    Selection { topics: topic.map(str::to_owned).into_iter().collect(), period, channels, ..Selection::default() }
 }
 
 fn values(bytes: &[u8], selection: &Selection) -> Vec<f64> {
-    read("r.mcap", bytes, selection).unwrap().sequences()[0].values().to_vec()
+    read_bytes("r.mcap", bytes, selection).unwrap().sequences()[0].values().to_vec()
 }
 
 fn said(bytes: &[u8], selection: &Selection) -> (String, String) {
-    let error = read("r.mcap", bytes, selection).unwrap_err();
+    let error = read_bytes("r.mcap", bytes, selection).unwrap_err();
     let help = miette::Diagnostic::help(&error).map(|help| help.to_string()).unwrap_or_default();
     (error.to_string(), help)
 }
@@ -86,7 +90,7 @@ fn repacked(bytes: &[u8], compression: &str, pack: impl Fn(&[u8]) -> Vec<u8>) ->
 
 #[test]
 fn joints_become_channels_and_messages_samples() {
-    let data = read("r.mcap", &recording(plain(), &ten()), &Selection::default()).unwrap();
+    let data = read_bytes("r.mcap", &recording(plain(), &ten()), &Selection::default()).unwrap();
     assert_eq!(data.channels(), ["elbow", "wrist"]);
     assert_eq!(data.sequences().len(), 1);
     assert_eq!((data.sequences()[0].len(), data.sequences()[0].sample(4)), (10, &[4.0, -2.0][..]));
@@ -130,7 +134,7 @@ fn the_topic_is_the_one_that_is_asked_for_or_the_only_one() {
     assert_eq!(message, "r.mcap: messages of /binary are encoded as `protobuf`; needed: json");
     // What the network was told is what to learn from.
     messages.push(("/sensed", 900, r#"{"timestamp":{"sec":0,"nsec":900},"z":1,"a":2}"#.into()));
-    let data = read("r.mcap", &recording(plain(), &messages), &Selection::default()).unwrap();
+    let data = read_bytes("r.mcap", &recording(plain(), &messages), &Selection::default()).unwrap();
     assert_eq!(
         (data.channels(), data.sequences()[0].values()),
         (&["z".to_owned(), "a".to_owned()][..], &[1.0, 2.0][..])
@@ -199,7 +203,7 @@ fn a_recording_may_hold_several_sequences() {
             );
         }
     }
-    let data = read("r.mcap", &recording(plain(), &messages), &Selection::default()).unwrap();
+    let data = read_bytes("r.mcap", &recording(plain(), &messages), &Selection::default()).unwrap();
     let found: Vec<_> = data.sequences().iter().map(|sequence| (sequence.name.as_str(), sequence.values())).collect();
     assert_eq!(found, [("left", &[0., 1., 2.][..]), ("right", &[20., 21., 22.][..])]);
     messages[0].2 = "{}".into();
@@ -210,7 +214,7 @@ fn a_recording_may_hold_several_sequences() {
 fn a_recording_that_is_cut_or_damaged_anywhere_is_refused_or_read_but_never_panics() {
     let bytes = recording(plain(), &ten());
     for length in 0..bytes.len() {
-        let error = read("r.mcap", &bytes[..length], &Selection::default()).unwrap_err();
+        let error = read_bytes("r.mcap", &bytes[..length], &Selection::default()).unwrap_err();
         assert!(matches!(error, FileError::Recording { .. }), "{error}");
     }
     assert_eq!(said(&bytes[..300], &Selection::default()).0, "r.mcap: the recording is cut off");
@@ -221,7 +225,7 @@ fn a_recording_that_is_cut_or_damaged_anywhere_is_refused_or_read_but_never_pani
         for bit in 0..8 {
             let mut damaged = bytes.clone();
             damaged[at] ^= 1 << bit;
-            if let Ok(data) = read("r.mcap", &damaged, &Selection::default()) {
+            if let Ok(data) = read_bytes("r.mcap", &damaged, &Selection::default()) {
                 // What is not checked by the chunk's checksum: times of indexes, attachments, the library's name.
                 assert_eq!(data.sequences()[0].values(), expected, "byte {at}, bit {bit}");
             }

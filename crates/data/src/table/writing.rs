@@ -1,11 +1,26 @@
-//! Tables as text, such that [`super::text`] reads the same data again.
+//! Tables as text, such that [`super`] reads the same data again.
 
 use std::collections::HashSet;
 use std::fmt::Write;
 
 use scrnn::dataset::Dataset;
 
-use super::Field;
+use crate::{Field, FileError};
+
+/// The bytes of a `.csv`.
+pub fn write_csv(_: &str, fields: &[Field<'_>]) -> Result<Vec<u8>, FileError> {
+    Ok(csv(fields, ',').into_bytes())
+}
+
+/// The bytes of a `.tsv`.
+pub fn write_tsv(_: &str, fields: &[Field<'_>]) -> Result<Vec<u8>, FileError> {
+    Ok(csv(fields, '\t').into_bytes())
+}
+
+/// The bytes of a `.txt`.
+pub fn write_blocks(_: &str, fields: &[Field<'_>]) -> Result<Vec<u8>, FileError> {
+    Ok(blocks(fields).into_bytes())
+}
 
 /// A table with a header: the sequence, the step in it from 1, then each field's channels.
 pub fn csv(fields: &[Field<'_>], separator: char) -> String {

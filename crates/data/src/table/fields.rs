@@ -3,6 +3,8 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
+use super::numbers::{Value, has_decimal_comma};
+
 /// What stands between two fields.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Separator {
@@ -22,20 +24,31 @@ pub enum DetectionOrder {
 }
 
 impl Separator {
-    /// The first separator of the order that stands in the line outside of quotes.
+    /// The first separator of the order that stands in the line outside of quotes and lists.
     pub fn detect(line: &str, order: DetectionOrder) -> Self {
         let candidates = match order {
             DetectionOrder::CommaFirst => [';', ',', '\t'],
             DetectionOrder::TabFirst => ['\t', ';', ','],
         };
-        let outside = |wanted: char| {
-            let mut quoted = false;
-            line.trim_end().chars().any(|c| {
-                quoted ^= c == '"';
-                c == wanted && !quoted
-            })
-        };
-        candidates.into_iter().find(|&c| outside(c)).map_or(Self::Whitespace, Self::Character)
+        let mut outside = [false; 3];
+        let (mut quoted, mut listed, mut begins) = (false, false, true);
+        for c in line.trim_end().chars() {
+            quoted ^= c == '"';
+            // A list in a cell; brackets within a name are part of it.
+            listed = (listed || begins && c == '[') && c != ']';
+            if !quoted && !listed {
+                candidates.iter().zip(&mut outside).for_each(|(candidate, found)| *found |= *candidate == c);
+                begins = c.is_whitespace() || candidates.contains(&c);
+            }
+        }
+        let found = candidates.into_iter().zip(outside).find(|(_, found)| *found);
+        let found = found.map_or(Self::Whitespace, |(candidate, _)| Self::Character(candidate));
+        // Between tabs or spaces, commas may be decimal ones: if all that stands there are numbers then.
+        if found == Self::Character(',') {
+            let others = [Self::Character('\t'), Self::Whitespace];
+            return others.into_iter().find(|&other| has_decimal_commas(line, other)).unwrap_or(found);
+        }
+        found
     }
 
     /// Its name in messages.
@@ -47,6 +60,15 @@ impl Separator {
             Self::Whitespace => "spaces or tabs",
         }
     }
+}
+
+/// Whether the line has several fields between these separators, all of them numbers, some with a decimal comma.
+fn has_decimal_commas(line: &str, separator: Separator) -> bool {
+    let mut fields = Vec::new();
+    split(line, separator, &mut fields);
+    let with_comma = |field: &Field<'_>| has_decimal_comma(&field.text);
+    let is_number = |field: &Field<'_>| with_comma(field) || matches!(Value::of(&field.text), Value::Number(_));
+    fields.len() > 1 && fields.iter().any(with_comma) && fields.iter().all(is_number)
 }
 
 /// One field of a line.
@@ -68,13 +90,23 @@ pub fn split<'a>(line: &'a str, separator: Separator, into: &mut Vec<Field<'a>>)
     };
     let pads_field = |c: char| c.is_whitespace() && separator != Separator::Character(c);
     let mut at = 0;
+    // Where no bracket closes any more, none is looked for again: the time is that of the line's length.
+    let mut lists_end = true;
     loop {
         let start = at + (line.len() - at - line[at..].trim_start_matches(pads_field).len());
         if start == line.len() && separator == Separator::Whitespace {
             return;
         }
         let closing = line[start..].strip_prefix('"').and_then(closing_quote).map(|length| start + 1 + length);
-        let searched = closing.map_or(start, |closing| closing + 1);
+        let list = match line[start..].strip_prefix('[') {
+            Some(rest) if lists_end => {
+                let end = rest.find(']');
+                lists_end = end.is_some();
+                end.map(|length| start + 1 + length)
+            }
+            _ => None,
+        };
+        let searched = closing.or(list).map_or(start, |closing| closing + 1);
         let end = line[searched..].find(ends_field).map_or(line.len(), |length| searched + length);
         let trimmed = start + line[start..end].trim_end().len();
         let text = match closing {
@@ -104,33 +136,6 @@ fn unquoted(text: &str) -> Cow<'_, str> {
     if text.contains('"') { Cow::Owned(text.replace("\"\"", "\"")) } else { Cow::Borrowed(text) }
 }
 
-/// A field that should be a sample.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Value {
-    /// A finite number.
-    Number(f64),
-    /// NaN, infinity, or how programs write that a value is missing.
-    NotFinite,
-    /// Something else.
-    Other,
-}
-
-impl Value {
-    /// What `text` means.
-    pub fn of(text: &str) -> Self {
-        match text.parse::<f64>() {
-            Ok(number) if number.is_finite() => Self::Number(number),
-            Ok(_) => Self::NotFinite,
-            Err(_) if text.is_empty() => Self::NotFinite,
-            Err(_) => {
-                let missing = ["na", "n/a", "#n/a", "<na>", "null", "none", "-nan(ind)", "nan(ind)"];
-                let is_missing = missing.iter().any(|missing| text.eq_ignore_ascii_case(missing));
-                if is_missing { Self::NotFinite } else { Self::Other }
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -148,6 +153,9 @@ mod tests {
         assert_eq!(detect("1,5;2,5"), Separator::Character(';'));
         assert_eq!(detect("1\t2"), Separator::Character('\t'));
         assert_eq!(detect("1,\t2"), Separator::Character(','));
+        assert_eq!(detect("40,038\t53,489"), Separator::Character('\t'));
+        assert_eq!(detect("1, 2"), Separator::Character(','));
+        assert_eq!(detect("1,5 2,5"), Separator::Whitespace);
         assert_eq!(detect("\"a, b\" 2"), Separator::Whitespace);
         assert_eq!(Separator::detect("a, b\t2", DetectionOrder::TabFirst), Separator::Character('\t'));
     }
@@ -171,13 +179,13 @@ mod tests {
     }
 
     #[test]
-    fn missing_values_are_told_from_words() {
-        for text in ["nan", "NaN", "inf", "-Infinity", "1e999", "", "NA", "#N/A", "null"] {
-            assert_eq!(Value::of(text), Value::NotFinite, "{text}");
-        }
-        for text in ["y1", "1,5", "0x10", "1.2.3", "--1", "."] {
-            assert_eq!(Value::of(text), Value::Other, "{text}");
-        }
-        assert_eq!(Value::of("-1.5e-3"), Value::Number(-1.5e-3));
+    fn a_list_is_one_field() {
+        let detect = |line| Separator::detect(line, DetectionOrder::CommaFirst);
+        assert_eq!(detect("[0.1 0.2]"), Separator::Whitespace);
+        assert_eq!(detect("[0.1, 0.2];3"), Separator::Character(';'));
+        assert_eq!(detect("a [deg, rad] b"), Separator::Whitespace);
+        assert_eq!(detect("elbow[deg],b"), Separator::Character(','));
+        assert_eq!(fields("[0.1 0.2] 3", Separator::Whitespace), ["[0.1 0.2]", "3"]);
+        assert_eq!(fields("1,[0.1,0.2],[ 3", Separator::Character(',')), ["1", "[0.1,0.2]", "[ 3"]);
     }
 }
