@@ -36,7 +36,8 @@ impl Clock {
         let stamps = stamps(tracks, whole_stamps);
         let logged = || tracks.iter().map(|track| track.logged.clone()).collect::<Vec<_>>();
         let published = || {
-            let times = |track: &Track| if track.published.is_empty() { &track.logged } else { &track.published }.clone();
+            let times =
+                |track: &Track| if track.published.is_empty() { &track.logged } else { &track.published }.clone();
             tracks.iter().map(times).collect::<Vec<_>>()
         };
         let clock = |source, times: Vec<Vec<i64>>, spurned| {

@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use std::rc::Rc;
 
 use super::message::{Message, Trouble};
-use super::numbers::{Manner, MOST_NUMBERS, Numbers, OwnedShape, QUANTITIES, Stamp, is_clock, stamp, take};
+use super::numbers::{MOST_NUMBERS, Manner, Numbers, OwnedShape, QUANTITIES, Stamp, is_clock, stamp, take};
 use super::tree::Tree;
 use crate::budget::Budget;
 
@@ -55,6 +55,13 @@ struct Part {
     straight: bool,
 }
 
+/// A shape that was met, and where its values go.
+#[derive(Debug)]
+struct Known {
+    shape: OwnedShape,
+    parts: Vec<Part>,
+}
+
 /// What is collected of a topic.
 #[derive(Debug)]
 pub struct Collecting {
@@ -74,9 +81,10 @@ pub struct Collecting {
     pub empty: usize,
     places: HashMap<String, u32>,
     tracks_by_columns: HashMap<Rc<[u32]>, usize>,
-    shapes: HashMap<OwnedShape, Rc<[Part]>>,
+    /// Shapes by their keys, which two may share: the latest then stays.
+    shapes: HashMap<u64, Rc<Known>>,
     shape_bytes: usize,
-    last: Option<(OwnedShape, Rc<[Part]>)>,
+    last: Option<Rc<Known>>,
     numbers: Numbers,
 }
 
@@ -106,6 +114,11 @@ impl Collecting {
         self.wanted.is_some()
     }
 
+    /// How many numbers the last message held.
+    pub fn taken(&self) -> usize {
+        self.numbers.values.len()
+    }
+
     /// Takes the numbers of a message.
     ///
     /// # Errors
@@ -133,11 +146,11 @@ impl Collecting {
         numbers: &Numbers,
         budget: &Budget,
     ) -> Result<Result<(), String>, Trouble> {
-        let parts = match self.parts(numbers, budget)? {
-            Ok(parts) => parts,
+        let known = match self.parts(numbers, budget)? {
+            Ok(known) => known,
             Err(why) => return Ok(Err(why)),
         };
-        self.empty += usize::from(parts.is_empty());
+        self.empty += usize::from(known.parts.is_empty());
         let stamp = match stamp(tree) {
             Some(Stamp::Nanoseconds(time)) => time,
             Some(Stamp::Whole(time)) => {
@@ -146,9 +159,12 @@ impl Collecting {
             }
             None => NO_STAMP,
         };
-        for part in &*parts {
+        for part in &known.parts {
             budget.take_values::<f64>(part.order.len() + 3)?;
             let track = &mut self.tracks[part.track];
+            if track.logged.is_empty() {
+                track.expect(message.expected, stamp, budget);
+            }
             let start = track.values.len();
             if part.straight {
                 track.values.extend_from_slice(&numbers.values);
@@ -165,36 +181,38 @@ impl Collecting {
     }
 
     /// Where the values of a message go.
-    fn parts(&mut self, numbers: &Numbers, budget: &Budget) -> Result<Result<Rc<[Part]>, String>, Trouble> {
+    fn parts(&mut self, numbers: &Numbers, budget: &Budget) -> Result<Result<Rc<Known>, String>, Trouble> {
         let shape = numbers.shape();
-        if let Some((last, parts)) = &self.last
-            && shape.is(last)
+        if let Some(last) = &self.last
+            && shape.is(&last.shape)
         {
-            return Ok(Ok(Rc::clone(parts)));
+            return Ok(Ok(Rc::clone(last)));
         }
-        let owned = shape.to_owned();
-        let parts = match self.shapes.get(&owned) {
-            Some(parts) => Rc::clone(parts),
-            None => {
-                let parts: Rc<[Part]> = match self.new_shape(numbers, budget)? {
-                    Ok(parts) => parts.into(),
-                    Err(why) => return Ok(Err(why)),
-                };
-                // The orders of its parts count too.
-                let bytes = shape.bytes() + 8 * numbers.values.len();
-                if self.shape_bytes + bytes > MOST_SHAPE_BYTES {
-                    self.shapes.clear();
-                    self.shape_bytes = 0;
-                }
-                if bytes <= MOST_SHAPE_BYTES {
-                    self.shape_bytes += bytes;
-                    self.shapes.insert(owned.clone(), Rc::clone(&parts));
-                }
-                parts
-            }
+        let key = shape.key();
+        if let Some(known) = self.shapes.get(&key)
+            && shape.is(&known.shape)
+        {
+            let known = Rc::clone(known);
+            self.last = Some(Rc::clone(&known));
+            return Ok(Ok(known));
+        }
+        let parts = match self.new_shape(numbers, budget)? {
+            Ok(parts) => parts,
+            Err(why) => return Ok(Err(why)),
         };
-        self.last = Some((owned, Rc::clone(&parts)));
-        Ok(Ok(parts))
+        let known = Rc::new(Known { shape: shape.to_owned(), parts });
+        // The orders of its parts count too.
+        let bytes = shape.bytes() + 8 * numbers.values.len();
+        if self.shape_bytes + bytes > MOST_SHAPE_BYTES {
+            self.shapes.clear();
+            self.shape_bytes = 0;
+        }
+        if bytes <= MOST_SHAPE_BYTES {
+            self.shape_bytes += bytes;
+            self.shapes.insert(key, Rc::clone(&known));
+        }
+        self.last = Some(Rc::clone(&known));
+        Ok(Ok(known))
     }
 
     /// Takes columns out.
@@ -224,7 +242,8 @@ impl Collecting {
         if self.wanted.is_some() && self.available.len() < numbers.values.len() {
             // What was taken of joints goes by their names alone.
             let taken = numbers.quantity.map_or("", |quantity| QUANTITIES[usize::from(quantity)]);
-            let again = |name: &&str| !taken.is_empty() && name.strip_prefix(taken).is_some_and(|rest| rest.starts_with('.'));
+            let again =
+                |name: &&str| !taken.is_empty() && name.strip_prefix(taken).is_some_and(|rest| rest.starts_with('.'));
             self.available = numbers.names().filter(|name| !again(name)).take(1000).map(str::to_owned).collect();
         }
         for (place, name) in numbers.names().enumerate() {
@@ -247,7 +266,8 @@ impl Collecting {
             if known.quantity.is_none() {
                 known.quantity = quantity;
             } else if known.quantity != quantity {
-                let said = |quantity: Option<u8>| quantity.map_or("value", |quantity| QUANTITIES[usize::from(quantity)]);
+                let said =
+                    |quantity: Option<u8>| quantity.map_or("value", |quantity| QUANTITIES[usize::from(quantity)]);
                 return Ok(Err(format!(
                     "holds the {} of `{name}`, but messages before it the {}",
                     said(numbers.quantity),
@@ -324,6 +344,19 @@ impl Track {
         parts
     }
 
+    /// Makes room for as many messages as the file tells of, if that is in proportion to it: no more is then ever held.
+    fn expect(&mut self, messages: u64, stamp: i64, budget: &Budget) {
+        let width = self.columns.len();
+        let Ok(messages) = usize::try_from(messages) else { return };
+        let values = messages.saturating_mul(width);
+        // A four-hundredth of what the file may be turned into is some times its size.
+        if 8 * (values as u64).saturating_add(messages as u64) <= budget.left() / 400 {
+            self.values.reserve_exact(values);
+            self.logged.reserve_exact(messages);
+            self.stamps.reserve_exact(if stamp == NO_STAMP { 0 } else { messages });
+        }
+    }
+
     fn add_times(&mut self, message: &Message<'_>, stamp: i64) {
         let before = self.logged.len();
         self.logged.push(message.logged);
@@ -374,7 +407,7 @@ mod tests {
 
     fn add(collecting: &mut Collecting, time: i64, text: &str) -> Result<(), String> {
         let channel = Rc::new(Channel::default());
-        let message = Message { channel: &channel, logged: time, published: time, number: 1, data: &[] };
+        let message = Message { channel: &channel, logged: time, published: time, number: 1, expected: 0, data: &[] };
         let manner = Manner { all: collecting.takes_all(), ..JSON };
         let tree = from_json(text.as_bytes()).unwrap();
         collecting.take(&message, &tree, manner, &Budget::of(1 << 30)).unwrap()
@@ -397,7 +430,8 @@ mod tests {
 
     #[test]
     fn only_what_is_wanted_is_kept() {
-        let mut some = Collecting::new(None, Some(vec![("velocity.b".into(), "b".into()), ("x[1]".into(), "x1".into())]));
+        let mut some =
+            Collecting::new(None, Some(vec![("velocity.b".into(), "b".into()), ("x[1]".into(), "x1".into())]));
         add(&mut some, 1, r#"{"name":["a","b"],"position":[1,2],"velocity":[3,4]}"#).unwrap();
         assert_eq!((some.columns[0].name.as_str(), &some.tracks[0].values[..]), ("b", &[4.0][..]));
         assert_eq!(some.available, ["a", "b", "velocity.a", "velocity.b"]);
@@ -420,7 +454,9 @@ mod tests {
 
     #[test]
     fn indices_in_brackets_and_behind_points_are_the_same() {
-        for (name, plain) in [("data[3]", "data.3"), ("a[0].b[12]", "a.0.b.12"), ("a[x]", "a[x]"), ("a[", "a["), ("", "")] {
+        for (name, plain) in
+            [("data[3]", "data.3"), ("a[0].b[12]", "a.0.b.12"), ("a[x]", "a[x]"), ("a[", "a["), ("", "")]
+        {
             assert_eq!(canonical(name), plain);
         }
     }

@@ -30,6 +30,7 @@ mod opcode {
     pub const CHANNEL: u8 = 0x04;
     pub const MESSAGE: u8 = 0x05;
     pub const CHUNK: u8 = 0x06;
+    pub const STATISTICS: u8 = 0x0b;
 }
 
 /// Calls `each` with every message, in the order of the file. `count` messages came before it.
@@ -54,7 +55,9 @@ pub fn messages<R: Read + Seek>(mut file: R, count: &mut usize, each: &mut Each<
         }
         _ => return Err(RecordingProblem::NotMcap.into()),
     }
-    let mut reader = Reader { schemas: HashMap::new(), channels: HashMap::new(), count };
+    let expected = expected(&mut file, length).unwrap_or_default();
+    file.seek(SeekFrom::Start(8))?;
+    let mut reader = Reader { schemas: HashMap::new(), channels: HashMap::new(), expected, count };
     let (mut body, mut content) = (Vec::new(), Vec::new());
     let mut unpacked = 0_u64;
     loop {
@@ -102,6 +105,34 @@ pub fn messages<R: Read + Seek>(mut file: R, count: &mut usize, each: &mut Each<
     if end == MAGIC { Ok(()) } else { Err(RecordingProblem::CutOff.into()) }
 }
 
+/// How many messages each channel has, as the statistics at the end of the file tell. Nothing is believed of it but how
+/// much room could be made.
+fn expected<R: Read + Seek>(file: &mut R, length: u64) -> Option<HashMap<u16, u64>> {
+    const FOOTER: u64 = 9 + 20 + 8;
+    const LARGEST: u64 = 1 << 20;
+    file.seek(SeekFrom::Start(length.checked_sub(FOOTER)?)).ok()?;
+    let mut footer = [0; FOOTER as usize];
+    file.read_exact(&mut footer).ok()?;
+    let (opcode, mut body) = Bytes(&footer).record()?;
+    let start = body.u64().filter(|&start| opcode == opcode::FOOTER && start >= 8)?;
+    let summary = length.checked_sub(FOOTER)?.checked_sub(start)?;
+    file.seek(SeekFrom::Start(start)).ok()?;
+    let mut bytes = Vec::new();
+    file.take(summary.min(LARGEST)).read_to_end(&mut bytes).ok()?;
+    let mut records = Bytes(&bytes);
+    while let Some((opcode, mut body)) = records.record() {
+        if opcode == opcode::STATISTICS {
+            // Counts of all kinds of records, the first and the last time, bytes of the map that follows.
+            body.take(8 + 2 + 4 * 4 + 2 * 8)?;
+            let bytes = usize::try_from(body.u32()?).ok()?;
+            let mut map = Bytes(body.take(bytes)?);
+            let pairs = std::iter::from_fn(|| Some((map.u16()?, map.u64()?)));
+            return Some(pairs.collect());
+        }
+    }
+    None
+}
+
 fn skip<R: Read + Seek>(file: &mut BufReader<R>, count: u64) -> Result<(), Trouble> {
     match i64::try_from(count) {
         Ok(count) => Ok(file.seek_relative(count)?),
@@ -113,6 +144,7 @@ fn skip<R: Read + Seek>(file: &mut BufReader<R>, count: u64) -> Result<(), Troub
 struct Reader<'c> {
     schemas: HashMap<u16, Rc<Schema>>,
     channels: HashMap<u16, Rc<Channel>>,
+    expected: HashMap<u16, u64>,
     count: &'c mut usize,
 }
 
@@ -146,7 +178,8 @@ impl Reader<'_> {
                 let channel =
                     self.channels.get(&id).ok_or(damaged("a message belongs to a channel that is not there"))?;
                 let (logged, published) = (nanoseconds(logged), nanoseconds(published));
-                each(&Message { channel, logged, published, number: *self.count, data: body.0 })?;
+                let expected = self.expected.get(&id).copied().unwrap_or_default();
+                each(&Message { channel, logged, published, number: *self.count, expected, data: body.0 })?;
             }
             // Indexes, statistics, attachments, and what later versions add.
             _ => {}

@@ -10,16 +10,39 @@ use super::tree::{self, Tree};
 
 /// Types that hold no movements: pictures, words, the system's own affairs.
 const NO_MOVEMENTS: [&str; 22] = [
-    "sensor_msgs/Image", "sensor_msgs/CompressedImage", "sensor_msgs/CameraInfo", "sensor_msgs/PointCloud",
-    "sensor_msgs/PointCloud2", "rosgraph_msgs/Clock", "std_msgs/String", "std_msgs/Empty", "std_msgs/Header",
-    "nav_msgs/OccupancyGrid", "nav_msgs/Path", "visualization_msgs/Marker", "visualization_msgs/MarkerArray",
-    "foxglove.CompressedImage", "foxglove.CompressedVideo", "foxglove.RawImage", "foxglove.PointCloud", "foxglove.Log",
-    "foxglove.SceneUpdate", "foxglove.CameraCalibration", "foxglove.Grid", "foxglove.LaserScan",
+    "sensor_msgs/Image",
+    "sensor_msgs/CompressedImage",
+    "sensor_msgs/CameraInfo",
+    "sensor_msgs/PointCloud",
+    "sensor_msgs/PointCloud2",
+    "rosgraph_msgs/Clock",
+    "std_msgs/String",
+    "std_msgs/Empty",
+    "std_msgs/Header",
+    "nav_msgs/OccupancyGrid",
+    "nav_msgs/Path",
+    "visualization_msgs/Marker",
+    "visualization_msgs/MarkerArray",
+    "foxglove.CompressedImage",
+    "foxglove.CompressedVideo",
+    "foxglove.RawImage",
+    "foxglove.PointCloud",
+    "foxglove.Log",
+    "foxglove.SceneUpdate",
+    "foxglove.CameraCalibration",
+    "foxglove.Grid",
+    "foxglove.LaserScan",
 ];
 /// Packages that hold none.
 const NO_MOVEMENTS_IN: [&str; 8] = [
-    "rcl_interfaces/", "diagnostic_msgs/", "lifecycle_msgs/", "action_msgs/", "statistics_msgs/", "rmw_dds_common/",
-    "rosbag2_interfaces/", "service_msgs/",
+    "rcl_interfaces/",
+    "diagnostic_msgs/",
+    "lifecycle_msgs/",
+    "action_msgs/",
+    "statistics_msgs/",
+    "rmw_dds_common/",
+    "rosbag2_interfaces/",
+    "service_msgs/",
 ];
 /// Topics that hold none.
 const NO_MOVEMENTS_ON: [&str; 5] = ["/tf_static", "/rosout", "/parameter_events", "/clock", "/robot_description"];
@@ -45,12 +68,11 @@ impl Decoder {
         match channel.encoding.as_str() {
             "json" => Ok(Self::Json),
             "cdr" => {
-                let text = std::str::from_utf8(description).map_err(|_| "have a definition that is no text".to_owned())?;
+                let text =
+                    std::str::from_utf8(description).map_err(|_| "have a definition that is no text".to_owned())?;
                 Ok(Self::Cdr(Rc::new(ros::definition(name, language, text)?)))
             }
-            "protobuf" if language == "protobuf" => {
-                Ok(Self::Protobuf(Rc::new(Descriptors::parse(name, description)?)))
-            }
+            "protobuf" if language == "protobuf" => Ok(Self::Protobuf(Rc::new(Descriptors::parse(name, description)?))),
             "protobuf" => Err(format!("are protobuf, but described in `{}`", crate::excerpt::shortened(language))),
             other => Err(format!("are encoded as `{}`; known: json, cdr, protobuf", crate::excerpt::shortened(other))),
         }

@@ -6,6 +6,7 @@
 //! | a folder with `metadata.yaml` | the files that it names, in that order |
 //! | a folder of such files | in the order of the numbers in their names |
 
+use std::cell::Cell;
 use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -21,6 +22,36 @@ use crate::{FileError, RecordingProblem};
 const LARGEST_METADATA: u64 = 16 << 20;
 /// What a compressed message may unpack to, as a multiple of itself.
 const LARGEST_RATIO: u64 = 1000;
+/// What a zstd decoder may look back on: what every decoder grants (RFC 8878).
+const WINDOW: u64 = 8 << 20;
+
+/// What may be done on behalf of files, in numbers that are taken out of messages: each is held, named and compared, and
+/// what is packed well could ask for a thousand for each byte.
+#[derive(Debug)]
+pub struct Effort {
+    left: Cell<u64>,
+}
+
+impl Effort {
+    /// Numbers that any file may hold,
+    const FREE: u64 = 1 << 20;
+    /// and those that it may hold for each of its bytes.
+    const RATIO: u64 = 64;
+
+    fn of_file(bytes: u64) -> Self {
+        Self { left: Cell::new(Self::FREE.saturating_add(bytes.saturating_mul(Self::RATIO))) }
+    }
+
+    /// Counts a message of so many bytes and numbers.
+    ///
+    /// # Errors
+    /// [`RecordingProblem::TooMany`].
+    pub fn spend(&self, bytes: usize, numbers: usize) -> Result<(), RecordingProblem> {
+        let left = self.left.get().checked_sub(16 + bytes as u64 / 16 + numbers as u64);
+        self.left.set(left.ok_or(RecordingProblem::TooMany { allowed: Self::RATIO })?);
+        Ok(())
+    }
+}
 
 /// How a file holds messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,6 +76,8 @@ pub struct Files<'s> {
     files: Vec<(Storage, Holder<'s>)>,
     /// What may be held on their behalf.
     pub budget: Budget,
+    /// What may be done on their behalf.
+    pub effort: Effort,
     /// Whether each message is packed with zstd.
     packed: bool,
 }
@@ -71,7 +104,12 @@ impl<'s> Files<'s> {
         }
         let bytes = source.open()?.seek(std::io::SeekFrom::End(0));
         let bytes = bytes.map_err(|error| FileError::disk("read", source.path(), error))?;
-        Ok(Self { files: vec![(storage, Holder::Given(source))], budget: Budget::of_file(bytes), packed: false })
+        Ok(Self {
+            files: vec![(storage, Holder::Given(source))],
+            budget: Budget::of_file(bytes),
+            effort: Effort::of_file(bytes),
+            packed: false,
+        })
     }
 
     fn of_folder(folder: &Path) -> Result<Self, FileError> {
@@ -81,14 +119,17 @@ impl<'s> Files<'s> {
             let length = std::fs::metadata(path).map_err(|error| FileError::disk("read", path, error))?.len();
             bytes = bytes.saturating_add(length);
             let Some(storage) = Storage::of(path) else {
-                return Err(wrong(folder, RecordingProblem::Bag(format!("its file `{}` is neither .mcap nor .db3", path.display()))));
+                return Err(wrong(
+                    folder,
+                    RecordingProblem::Bag(format!("its file `{}` is neither .mcap nor .db3", path.display())),
+                ));
             };
             if storage == Storage::Sqlite {
                 check_journal(path)?;
             }
             files.push((storage, Holder::Found(path.clone())));
         }
-        Ok(Self { files, budget: Budget::of_file(bytes), packed: metadata.packed })
+        Ok(Self { files, budget: Budget::of_file(bytes), effort: Effort::of_file(bytes), packed: metadata.packed })
     }
 
     /// The files, as people would name them.
@@ -109,10 +150,10 @@ impl<'s> Files<'s> {
         for ((storage, holder), name) in self.files.iter().zip(self.names()) {
             let in_file = |trouble| (name.clone(), trouble);
             let opened: Result<Box<dyn crate::format::ReadSeek + '_>, Trouble> = match holder {
-                Holder::Given(source) => source.open().map_err(Trouble::File),
+                Holder::Given(source) => source.open().map_err(|error| Trouble::File(Box::new(error))),
                 Holder::Found(path) => match std::fs::File::open(path) {
                     Ok(file) => Ok(Box::new(file)),
-                    Err(error) => Err(Trouble::File(FileError::disk("read", path, error))),
+                    Err(error) => Err(Trouble::File(Box::new(FileError::disk("read", path, error)))),
                 },
             };
             let opened = opened.map_err(in_file)?;
@@ -125,7 +166,8 @@ impl<'s> Files<'s> {
                 };
                 unpacked.clear();
                 let most = LARGEST_RATIO.saturating_mul(message.data.len() as u64).min(left);
-                let stream = ruzstd::decoding::StreamingDecoder::new(message.data).map_err(|error| broken(&error))?;
+                let stream = ruzstd::decoding::StreamingDecoder::new_with_max_window_size(message.data, WINDOW);
+                let stream = stream.map_err(|error| broken(&error))?;
                 stream.take(most).read_to_end(&mut unpacked).map_err(|error| broken(&error))?;
                 left -= unpacked.len() as u64;
                 each(&Message { data: &unpacked, ..*message })
@@ -150,7 +192,9 @@ fn check_journal(path: &Path) -> Result<(), FileError> {
     let mut journal = path.as_os_str().to_owned();
     journal.push("-wal");
     match std::fs::metadata(&journal) {
-        Ok(found) if found.len() > 0 => Err(wrong(path, RecordingProblem::Journal { path: path.display().to_string() })),
+        Ok(found) if found.len() > 0 => {
+            Err(wrong(path, RecordingProblem::Journal { path: path.display().to_string() }))
+        }
         _ => Ok(()),
     }
 }
@@ -176,7 +220,8 @@ fn sqlite_messages<R: Read + Seek>(reader: R, count: &mut usize, each: &mut Each
                     definitions.get(&ros::definition::plain(name)).cloned().unwrap_or_default();
                 Rc::new(Schema { name: name.clone(), language, description })
             });
-            let (topic, encoding) = (String::from_utf8_lossy(topic).into_owned(), String::from_utf8_lossy(encoding).into_owned());
+            let (topic, encoding) =
+                (String::from_utf8_lossy(topic).into_owned(), String::from_utf8_lossy(encoding).into_owned());
             channels.insert(*id, Rc::new(Channel { topic, encoding, schema: Rc::clone(schema) }));
         }
         Ok::<(), Trouble>(())
@@ -189,7 +234,7 @@ fn sqlite_messages<R: Read + Seek>(reader: R, count: &mut usize, each: &mut Each
         *count += 1;
         let damaged = RecordingProblem::Damaged("a message belongs to a topic that is not there");
         let channel = channels.get(topic).ok_or(damaged)?;
-        each(&Message { channel, logged: *time, published: *time, number: *count, data })
+        each(&Message { channel, logged: *time, published: *time, number: *count, expected: 0, data })
     })?;
     if in_topics && found { Ok(()) } else { Err(RecordingProblem::NoBag.into()) }
 }
@@ -197,7 +242,7 @@ fn sqlite_messages<R: Read + Seek>(reader: R, count: &mut usize, each: &mut Each
 impl From<Problem> for Trouble {
     fn from(problem: Problem) -> Self {
         match problem {
-            Problem::Wrong(what) => Self::Problem(RecordingProblem::Database(what)),
+            Problem::Wrong(what) => RecordingProblem::Database(what).into(),
             Problem::Disk(error) => Self::Disk(error),
         }
     }
@@ -234,7 +279,13 @@ impl Metadata {
             // Old bags name files from the folder's parent, and nobody leaves the folder.
             let file = Path::new(&name).file_name().map(|name| folder.join(name));
             let file = file.filter(|file| file.is_file()).ok_or_else(|| {
-                wrong(&path, RecordingProblem::Bag(format!("it names `{}`, which is not in the folder", crate::excerpt::shortened(&name))))
+                wrong(
+                    &path,
+                    RecordingProblem::Bag(format!(
+                        "it names `{}`, which is not in the folder",
+                        crate::excerpt::shortened(&name)
+                    )),
+                )
             })?;
             files.push(file);
         }
@@ -276,6 +327,10 @@ pub fn parse(text: &str) -> Result<(Vec<String>, bool), String> {
             format = unquoted(rest).to_ascii_lowercase();
         }
     }
+    let mut met = std::collections::HashSet::new();
+    if let Some(twice) = files.iter().find(|file| !met.insert(file.as_str())) {
+        return Err(format!("it names `{}` twice", crate::excerpt::shortened(twice)));
+    }
     if files.is_empty() {
         return Err("it names no files; `ros2 bag reindex` makes it anew".to_owned());
     }
@@ -301,6 +356,7 @@ mod tests {
         assert_eq!(parse("relative_file_paths: [a.mcap, b.mcap]\n").unwrap().0, ["a.mcap", "b.mcap"]);
         assert!(parse("relative_file_paths: []\n").unwrap_err().contains("names no files"));
         assert!(parse("").is_err());
+        assert!(parse("relative_file_paths: [a.mcap, a.mcap]\n").unwrap_err().contains("`a.mcap` twice"));
         let whole = "relative_file_paths:\n- a.db3.zstd\ncompression_mode: FILE\ncompression_format: zstd\n";
         assert!(parse(whole).unwrap_err().contains("zstd -d"));
     }

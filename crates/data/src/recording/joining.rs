@@ -77,7 +77,8 @@ impl Series {
         order.sort_by_key(|&index| self.times[index]);
         let columns = self.columns.len();
         self.times = order.iter().map(|&index| self.times[index]).collect();
-        self.values = order.iter().flat_map(|&index| &self.values[index * columns..(index + 1) * columns]).copied().collect();
+        self.values =
+            order.iter().flat_map(|&index| &self.values[index * columns..(index + 1) * columns]).copied().collect();
     }
 
     fn ends(&self) -> Option<(i64, i64)> {
@@ -110,12 +111,15 @@ pub fn join(
     let count = channels.names.len();
     if period.is_none() && series.len() < 2 {
         let Some(only) = series.pop() else { return Ok(Joined::default()) };
-        let is_whole = only.columns.len() == count && only.columns.iter().enumerate().all(|(place, &column)| place == column);
-        let values = if is_whole { only.values } else { rows(std::slice::from_ref(&only), &only.times, count, budget)? };
+        let is_whole =
+            only.columns.len() == count && only.columns.iter().enumerate().all(|(place, &column)| place == column);
+        let values =
+            if is_whole { only.values } else { rows(std::slice::from_ref(&only), &only.times, count, budget)? };
         return Ok(Joined { values, times: only.times, ..Joined::default() });
     }
     let mut met = vec![false; count];
-    let overlap = series.iter().flat_map(|series| &series.columns).any(|&column| std::mem::replace(&mut met[column], true));
+    let overlap =
+        series.iter().flat_map(|series| &series.columns).any(|&column| std::mem::replace(&mut met[column], true));
     if period.is_none()
         && overlap
         && let Some(times) = common_times(&series)
@@ -165,7 +169,8 @@ fn rows(series: &[Series], times: &[i64], count: usize, budget: &Budget) -> Resu
 
 /// One series for each column, where columns are in several.
 fn merged(series: Vec<Series>, count: usize, budget: &Budget) -> Result<Vec<Series>, Refusal> {
-    let mut columns: Vec<Series> = (0..count).map(|column| Series { columns: vec![column], ..Series::default() }).collect();
+    let mut columns: Vec<Series> =
+        (0..count).map(|column| Series { columns: vec![column], ..Series::default() }).collect();
     for series in series {
         budget.take_values::<[f64; 2]>(series.values.len())?;
         for part in series.split() {
@@ -180,9 +185,15 @@ fn merged(series: Vec<Series>, count: usize, budget: &Budget) -> Result<Vec<Seri
 }
 
 /// Brings all series to a period: the one that is given, else that of the densest series.
-fn resample(series: &[Series], channels: Channels<'_>, period: Option<i64>, budget: &Budget) -> Result<Joined, Refusal> {
+fn resample(
+    series: &[Series],
+    channels: Channels<'_>,
+    period: Option<i64>,
+    budget: &Budget,
+) -> Result<Joined, Refusal> {
     let said = |text: String| Err(Refusal::Said(text));
-    let middles: Vec<Option<i64>> = series.iter().map(|series| middle_interval(&series.times).filter(|&middle| middle > 0)).collect();
+    let middles: Vec<Option<i64>> =
+        series.iter().map(|series| middle_interval(&series.times).filter(|&middle| middle > 0)).collect();
     let densest = (0..series.len()).filter(|&index| middles[index].is_some()).min_by_key(|&index| middles[index]);
     let base = densest.unwrap_or(0);
     let Some(period) = period.or(middles.get(base).copied().flatten()) else {
@@ -284,10 +295,12 @@ mod tests {
 
     fn joined(series: Vec<Series>, discrete: &[bool], period: Option<i64>) -> Result<Joined, String> {
         let names: Vec<String> = (0..discrete.len()).map(|k| format!("n{k}")).collect();
-        join(series, Channels { names: &names, discrete }, period, &Budget::of(1 << 20)).map_err(|refusal| match refusal {
-            Refusal::Said(said) => said,
-            Refusal::Memory(over) => over.to_string(),
-        })
+        join(series, Channels { names: &names, discrete }, period, &Budget::of(1 << 20)).map_err(
+            |refusal| match refusal {
+                Refusal::Said(said) => said,
+                Refusal::Memory(over) => over.to_string(),
+            },
+        )
     }
 
     fn values(series: Vec<Series>, discrete: &[bool], period: Option<i64>) -> Vec<f64> {
@@ -343,7 +356,10 @@ mod tests {
         assert!(joined(ends, &[false], Some(1)).unwrap_err().contains("would become"));
         let apart = vec![series(&[0], &[0, 10, 20], &[0.; 3]), series(&[1], &[1000, 1010], &[0.; 2])];
         let said = joined(apart, &[false, false], None).unwrap_err();
-        assert_eq!(said, "the channels are not there at the same time: n0 from 0 s to 0.00000002 s; n1 from 0.000001 s to 0.00000101 s");
+        assert_eq!(
+            said,
+            "the channels are not there at the same time: n0 from 0 s to 0.00000002 s; n1 from 0.000001 s to 0.00000101 s"
+        );
         let wide: Vec<i64> = (0..1000).collect();
         let many: Vec<Series> = (0..300).map(|column| series(&[column], &[0, 999], &[0.; 2])).collect();
         let many = [vec![series(&[300], &wide, &[0.0; 1000])], many].concat();

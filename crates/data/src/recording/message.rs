@@ -39,6 +39,8 @@ pub struct Message<'a> {
     pub published: i64,
     /// Its number among all of the recording, from 1.
     pub number: usize,
+    /// How many of its channel the file tells of; 0 if it does not. It may tell anything.
+    pub expected: u64,
     /// What it says.
     pub data: &'a [u8],
 }
@@ -50,11 +52,11 @@ pub type Each<'e> = dyn FnMut(&Message<'_>) -> Result<(), Trouble> + 'e;
 #[derive(Debug)]
 pub enum Trouble {
     /// Something is wrong with it.
-    Problem(RecordingProblem),
+    Problem(Box<RecordingProblem>),
     /// Something is wrong with the messages of a topic.
-    Topic(String, RecordingProblem),
+    Topic(String, Box<RecordingProblem>),
     /// One of its files cannot be opened.
-    File(FileError),
+    File(Box<FileError>),
     /// It would fill the memory.
     Memory(OverBudget),
     /// The operating system refused.
@@ -63,7 +65,7 @@ pub enum Trouble {
 
 impl From<RecordingProblem> for Trouble {
     fn from(problem: RecordingProblem) -> Self {
-        Self::Problem(problem)
+        Self::Problem(Box::new(problem))
     }
 }
 

@@ -54,9 +54,8 @@ pub fn read(source: &Source<'_>, selection: &Selection) -> Result<Samples, FileE
     let name = source.name();
     let files = Files::of(source)?;
     let wanted = selection.channels.as_deref();
-    let mut findings = find(&files, &selection.topics, wanted).map_err(|(file, trouble)| {
-        refusal_of(if file.is_empty() { name } else { &file }, trouble)
-    })?;
+    let mut findings = find(&files, &selection.topics, wanted)
+        .map_err(|(file, trouble)| refusal_of(if file.is_empty() { name } else { &file }, trouble))?;
     let mut samples = Samples::default();
     samples.facts.named = true;
     samples.facts.topics = facts(&findings);
@@ -103,9 +102,11 @@ fn refusal(path: &str, problem: RecordingProblem) -> FileError {
 
 fn refusal_of(path: &str, trouble: Trouble) -> FileError {
     match trouble {
-        Trouble::Problem(problem) => refusal(path, problem),
-        Trouble::Topic(topic, problem) => refusal(&format!("{path}, topic {}", crate::excerpt::shortened(&topic)), problem),
-        Trouble::File(error) => error,
+        Trouble::Problem(problem) => refusal(path, *problem),
+        Trouble::Topic(topic, problem) => {
+            refusal(&format!("{path}, topic {}", crate::excerpt::shortened(&topic)), *problem)
+        }
+        Trouble::File(error) => *error,
         Trouble::Memory(problem) => FileError::OverBudget { path: path.to_owned(), problem },
         Trouble::Disk(error) => FileError::disk("read", Path::new(path), error),
     }
@@ -129,7 +130,8 @@ fn facts(findings: &Findings) -> Vec<Topic> {
 
 fn remark_on_topics(findings: &Findings, selection: &Selection, remarks: &mut Vec<Remark>) {
     let names = |taken: bool| {
-        let topics = findings.topics.values().filter(|topic| topic.taken == taken && topic.channel.topic != "/sequence");
+        let topics =
+            findings.topics.values().filter(|topic| topic.taken == taken && topic.channel.topic != "/sequence");
         topics.take(10).map(|topic| topic.channel.topic.as_str()).collect::<Vec<_>>().join(", ")
     };
     let others = names(false);
@@ -141,7 +143,8 @@ fn remark_on_topics(findings: &Findings, selection: &Selection, remarks: &mut Ve
         let joints = columns.iter().filter_map(|column| column.quantity).min();
         if let Some(quantity @ 1..) = joints {
             let quantity = numbers::QUANTITIES[usize::from(quantity)];
-            let what = format!("{}: the messages hold no positions; the {quantity} of each joint was taken", lane.topic);
+            let what =
+                format!("{}: the messages hold no positions; the {quantity} of each joint was taken", lane.topic);
             remarks.push(Remark::Understood { what });
         }
         if *empty > 0 {
@@ -197,9 +200,8 @@ fn section(
         wish => wish,
     };
     let mut remarks = Vec::new();
-    let mut clocks = clocks_of(&lanes, findings, wish, &mut remarks).map_err(|(topic, why)| {
-        refusal(&format!("{name}, topic {topic}"), RecordingProblem::NoStamps { why })
-    })?;
+    let mut clocks = clocks_of(&lanes, findings, wish, &mut remarks)
+        .map_err(|(topic, why)| refusal(&format!("{name}, topic {topic}"), RecordingProblem::NoStamps { why }))?;
     let mut series = Vec::new();
     let mut bursts = None;
     for ((lane, tracks), clock) in lanes.into_iter().zip(&mut clocks) {
@@ -232,14 +234,19 @@ fn section(
         samples.period = Some(period as f64 / 1e9);
         let found = match before {
             _ if kinds > 1 => format!("{kinds} kinds of messages"),
-            Some(before) if before > 0 && before != period => format!("messages every {} s", crate::times::seconds(before)),
+            Some(before) if before > 0 && before != period => {
+                format!("messages every {} s", crate::times::seconds(before))
+            }
             _ => String::new(),
         };
         if !found.is_empty() {
             remarks.push(Remark::Resampled { period: period as f64 / 1e9, found });
         }
         if joined.cut > 10 * period {
-            let what = format!("sequence {sequence}: {} s were cut off at its ends, where not all channels are there", crate::times::seconds(joined.cut));
+            let what = format!(
+                "sequence {sequence}: {} s were cut off at its ends, where not all channels are there",
+                crate::times::seconds(joined.cut)
+            );
             remarks.push(Remark::Understood { what });
         }
     } else {
@@ -270,20 +277,22 @@ fn clocks_of(
     let is_stamped = |clock: &Clock| clock.source == TimeSource::Header;
     let mixed = clocks.iter().any(is_stamped) && !clocks.iter().all(is_stamped);
     let far = |(clock, (_, tracks)): (&Clock, &Part)| {
-        let apart = clock.times.iter().zip(tracks).filter_map(|(times, track)| {
-            Some(times.first()?.saturating_sub(*track.logged.first()?).saturating_abs())
-        });
+        let apart =
+            clock.times.iter().zip(tracks).filter_map(|(times, track)| {
+                Some(times.first()?.saturating_sub(*track.logged.first()?).saturating_abs())
+            });
         is_stamped(clock) && apart.max().is_some_and(|apart| apart > 1_000_000_000)
     };
     if mixed && wish.is_none() && clocks.iter().zip(lanes).any(far) {
-        let what = "stamps are of another clock than the times of logging, and not all topics have them: all go by logging";
+        let what =
+            "stamps are of another clock than the times of logging, and not all topics have them: all go by logging";
         remarks.push(Remark::Understood { what: what.to_owned() });
         clocks = lanes.iter().map(|part| one(part, Some(TimeSource::Log))).collect::<Result<Vec<_>, _>>()?;
     }
     for (clock, (lane, tracks)) in clocks.iter().zip(lanes) {
         let topic = findings.lanes[*lane].topic.clone();
         let source_name = match clock.source {
-            TimeSource::Header => "the stamps in the messages",
+            TimeSource::Header => "the header stamp",
             TimeSource::Publish => "publishing",
             TimeSource::Log | TimeSource::Rows => "logging",
         };
@@ -291,7 +300,9 @@ fn clocks_of(
         match (clock.bursts, clock.logged_in_bursts) {
             (Some(burst), _) => remarks.push(Remark::Bursts { topic: topic.clone(), messages, burst }),
             (None, Some(burst)) => {
-                let what = format!("{topic}: the messages were logged in bursts of about {burst}; other times tell when they were made");
+                let what = format!(
+                    "{topic}: the messages were logged in bursts of about {burst}; other times tell when they were made"
+                );
                 remarks.push(Remark::Understood { what });
             }
             (None, None) => {}
@@ -336,7 +347,11 @@ fn gaps(series: &[Series], sequence: &str, gaps: &mut Vec<crate::Gap>) {
         for (index, pair) in series.times.windows(2).enumerate() {
             let interval = pair[1].saturating_sub(pair[0]);
             if interval as f64 > 1.5 * middle as f64 && gaps.len() < 1000 {
-                gaps.push(crate::Gap { sequence: sequence.to_owned(), after: index + 1, seconds: interval as f64 / 1e9 });
+                gaps.push(crate::Gap {
+                    sequence: sequence.to_owned(),
+                    after: index + 1,
+                    seconds: interval as f64 / 1e9,
+                });
             }
         }
     }
@@ -345,14 +360,16 @@ fn gaps(series: &[Series], sequence: &str, gaps: &mut Vec<crate::Gap>) {
 /// Notices a channel that holds each value for several samples.
 fn remark_on_stairs(samples: &mut Samples, channel: usize, places: &[Vec<Option<usize>>], findings: &Findings) {
     const FEWEST_STEPS: usize = 5;
-    let columns = findings.lanes.iter().zip(places).flat_map(|(lane, places)| lane.collecting.columns.iter().zip(places));
+    let columns =
+        findings.lanes.iter().zip(places).flat_map(|(lane, places)| lane.collecting.columns.iter().zip(places));
     if columns.into_iter().any(|(column, place)| *place == Some(channel) && column.discrete) {
         return;
     }
     let (mut runs, mut held, mut alike) = (0_usize, 0_usize, Vec::new());
     let mut levels = std::collections::HashSet::new();
     for track in &samples.tracks {
-        let mut values = track.values.iter().skip(channel).step_by(samples.channels.len()).filter(|value| !value.is_nan());
+        let mut values =
+            track.values.iter().skip(channel).step_by(samples.channels.len()).filter(|value| !value.is_nan());
         let Some(mut last) = values.next() else { continue };
         let mut run = 1;
         for value in values {
@@ -381,5 +398,7 @@ fn remark_on_stairs(samples: &mut Samples, channel: usize, places: &[Vec<Option<
     }
 }
 
+#[cfg(test)]
+mod bounds_tests;
 #[cfg(test)]
 pub mod tests;

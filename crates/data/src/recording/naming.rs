@@ -34,7 +34,8 @@ pub fn names(lanes: &[Lane], wanted: Option<&[String]>) -> Result<Named, Recordi
             found.entry(&known.name).or_default().push((index, column));
         }
     }
-    let mut places: Vec<Vec<Option<usize>>> = lanes.iter().map(|lane| vec![None; lane.collecting.columns.len()]).collect();
+    let mut places: Vec<Vec<Option<usize>>> =
+        lanes.iter().map(|lane| vec![None; lane.collecting.columns.len()]).collect();
     let mut names: Vec<String> = Vec::new();
     for name in wanted {
         match found.get(name.as_str()).map(Vec::as_slice) {

@@ -27,8 +27,22 @@ const NAME_LISTS: [&str; 4] = ["name", "names", "joint_names", "interface_names"
 const NAMES_OF_THINGS: [&str; 2] = ["name", "child_frame_id"];
 /// Names of a clock in a message, if it stands at the top.
 const CLOCKS: [&str; 16] = [
-    "timestamp", "time", "stamp", "t", "ts", "timestamp_ns", "timestamp_us", "timestamp_ms", "timestamp_s", "time_ns",
-    "time_us", "time_ms", "time_s", "stamp_ns", "unix_time", "time_stamp",
+    "timestamp",
+    "time",
+    "stamp",
+    "t",
+    "ts",
+    "timestamp_ns",
+    "timestamp_us",
+    "timestamp_ms",
+    "timestamp_s",
+    "time_ns",
+    "time_us",
+    "time_ms",
+    "time_s",
+    "stamp_ns",
+    "unix_time",
+    "time_stamp",
 ];
 
 /// How messages of an encoding are taken.
@@ -105,7 +119,7 @@ pub struct Shape<'a> {
 }
 
 /// A shape that is kept.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OwnedShape {
     names: Box<str>,
     ends: Box<[usize]>,
@@ -116,6 +130,19 @@ impl Shape<'_> {
     /// Whether it is `other`.
     pub fn is(&self, other: &OwnedShape) -> bool {
         self.quantity == other.quantity && *self.ends == *other.ends && *self.names == *other.names
+    }
+
+    /// A number that is nearly always another for other names.
+    pub fn key(&self) -> u64 {
+        const FACTOR: u64 = 0x9e37_79b9_7f4a_7c15;
+        let (words, rest) = self.names.as_bytes().as_chunks::<8>();
+        let start = (self.ends.len() as u64) << 8 | u64::from(self.quantity.unwrap_or(u8::MAX));
+        let mix = |key: u64, word: u64| {
+            let key = (key ^ word).wrapping_mul(FACTOR);
+            key ^ key >> 29
+        };
+        let key = words.iter().fold(start, |key, &word| mix(key, u64::from_le_bytes(word)));
+        rest.iter().fold(key, |key, &byte| mix(key, u64::from(byte)))
     }
 
     /// A copy.
@@ -460,7 +487,8 @@ mod tests {
         assert_eq!(of(wheels, JSON, Some("effort")), named(&[("l", 3.0), ("r", 4.0)]));
         assert_eq!(of(wheels, JSON, Some("position")), Err("holds 2 names, but 0 positions".into()));
         let all = of(wheels, Manner { all: true, ..JSON }, None);
-        let expected = [("l", 1.0), ("r", 2.0), ("velocity.l", 1.0), ("velocity.r", 2.0), ("effort.l", 3.0), ("effort.r", 4.0)];
+        let expected =
+            [("l", 1.0), ("r", 2.0), ("velocity.l", 1.0), ("velocity.r", 2.0), ("effort.l", 3.0), ("effort.r", 4.0)];
         assert_eq!(all, named(&expected));
         let list = r#"{"joints":[{"name":"l","velocity":1},{"name":"r","velocity":2}]}"#;
         assert_eq!(numbers(list), named(&[("l", 1.0), ("r", 2.0)]));

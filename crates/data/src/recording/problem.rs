@@ -49,6 +49,13 @@ pub enum RecordingProblem {
         allowed: u64,
     },
 
+    /// A file that takes very long.
+    #[error("it is packed so well that its messages hold more than {allowed} numbers for each of its bytes")]
+    TooMany {
+        /// What is granted.
+        allowed: u64,
+    },
+
     /// A database that cannot be read.
     #[error("{0}")]
     Database(String),
@@ -147,7 +154,9 @@ pub enum RecordingProblem {
     },
 
     /// Messages at uneven times, and no period.
-    #[error("sequence {sequence}: messages were logged in bursts of about {burst}, and nothing else tells when they were made")]
+    #[error(
+        "sequence {sequence}: messages were logged in bursts of about {burst}, and nothing else tells when they were made"
+    )]
     Bursts {
         /// The sequence.
         sequence: String,
@@ -178,16 +187,20 @@ impl RecordingProblem {
                 "the program that recorded it may have been killed; `mcap recover` saves what is there".to_owned()
             }
             Self::UnknownCompression { .. } => "`mcap compress --compression zstd` changes it".to_owned(),
-            Self::Journal { path } => format!("`sqlite3 {path} \"PRAGMA wal_checkpoint(TRUNCATE)\"` moves them into it"),
+            Self::TooMany { .. } => "if it is not damaged, `mcap decompress` unpacks it".to_owned(),
+            Self::Journal { path } => {
+                format!("`sqlite3 {path} \"PRAGMA wal_checkpoint(TRUNCATE)\"` moves them into it")
+            }
             Self::Ros1 { stem } => format!(
                 "`pip install rosbags`, then `rosbags-convert --src {stem}.bag --dst {stem}` makes a bag of ROS 2 of it, which is read"
             ),
             Self::NoBag => "bags of ROS 2 end in .mcap or .db3".to_owned(),
             Self::Encoding { .. } => {
-                "read are JSON, ROS 2 (cdr with a definition in ros2msg or ros2idl), and protobuf with its descriptors".to_owned()
+                "read are JSON, ROS 2 (cdr with a definition in ros2msg or ros2idl), and protobuf with its descriptors"
+                    .to_owned()
             }
             Self::NoTopic { topics, example, .. } | Self::WhichTopic { topics, example } => format!(
-                "say with `--topic {example}`, or `topics = [\"{example}\"]` in the experiment's [data], which to take: {topics}"
+                "say with `--topic {example}`, or `topics = [\"{example}\"]` in the experiment's [data], which to take; several are joined: {topics}"
             ),
             Self::NoStamps { .. } => "`time = \"log\"` goes by the times of logging".to_owned(),
             Self::Bursts { .. } => {

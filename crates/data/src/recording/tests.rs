@@ -181,10 +181,7 @@ fn what_a_message_does_not_hold_is_missing_and_what_it_holds_wrongly_is_named() 
     assert!(samples(&recording(plain(), &messages), &Selection::default()).tracks[0].values[15].is_nan());
     messages[7].2 = r#"{"joints":[{"name":"elbow","position":1},{"name":"wrist","position":"up"}]}"#.into();
     let (message, _) = said(&recording(plain(), &messages), &Selection::default());
-    assert_eq!(
-        message,
-        "r.mcap, topic /joint_states: message 8, of 0.0000007 s, holds no position of joint `wrist`"
-    );
+    assert_eq!(message, "r.mcap, topic /joint_states: message 8, of 0.0000007 s, holds no position of joint `wrist`");
     let (message, _) = said(&recording(plain(), &[("/a", 0, "{}".into())]), &Selection::default());
     assert_eq!(message, "r.mcap, topic /a: the messages hold no numbers");
 }

@@ -5,7 +5,7 @@ use std::rc::Rc;
 
 use super::collecting::Collecting;
 use super::decoding::{Decoder, is_movement};
-use super::files::Files;
+use super::files::{Effort, Files};
 use super::message::{Channel, Message, Schema, Trouble};
 use super::tree::{self, Tree};
 use crate::RecordingProblem;
@@ -62,8 +62,8 @@ pub struct Findings {
 /// # Errors
 /// The file, and what is wrong with it.
 pub fn find(files: &Files<'_>, asked: &[String], wanted: Option<&[String]>) -> Result<Findings, (String, Trouble)> {
-    let whole = |problem: RecordingProblem| (String::new(), Trouble::Problem(problem));
-    let mut pass = Pass::new(asked, wanted, &files.budget);
+    let whole = |problem: RecordingProblem| (String::new(), Trouble::from(problem));
+    let mut pass = Pass::new(asked, wanted, files);
     files.messages(&mut |message| pass.take(message))?;
     if asked.is_empty() && pass.findings.topics.contains_key(SENSED_TOPIC) && pass.chosen() != Some(SENSED_TOPIC) {
         // What the network was told is what to learn from.
@@ -77,15 +77,18 @@ pub fn find(files: &Files<'_>, asked: &[String], wanted: Option<&[String]>) -> R
     if several || asked.is_empty() && findings.lanes.is_empty() {
         // A single topic that cannot be read tells why itself.
         return match findings.topics.values().next() {
-            Some(only) if findings.topics.len() == 1 && let Err(why) = Decoder::of(&only.channel) => {
+            Some(only)
+                if findings.topics.len() == 1
+                    && let Err(why) = Decoder::of(&only.channel) =>
+            {
                 let path = only.channel.topic.clone();
-                Err((String::new(), Trouble::Topic(path, RecordingProblem::Encoding { why })))
+                Err((String::new(), Trouble::Topic(path, Box::new(RecordingProblem::Encoding { why }))))
             }
             _ => Err(whole(RecordingProblem::WhichTopic { topics, example })),
         };
     }
     if let Some((topic, problem)) = failure {
-        return Err((String::new(), Trouble::Topic(topic, problem)));
+        return Err((String::new(), Trouble::Topic(topic, Box::new(problem))));
     }
     if let Some(missing) = asked.iter().find(|entry| !findings.lanes.iter().any(|lane| entry.is(lane))) {
         return Err(whole(RecordingProblem::NoTopic { found: missing.text.clone(), topics, example }));
@@ -155,6 +158,7 @@ struct Pass<'p> {
     asked: Vec<Entry>,
     wanted: Option<&'p [String]>,
     budget: &'p Budget,
+    effort: &'p Effort,
     findings: Findings,
     routes: HashMap<*const Channel, Route>,
     decoders: HashMap<(*const Schema, String), Result<Decoder, String>>,
@@ -165,11 +169,19 @@ struct Pass<'p> {
 }
 
 impl<'p> Pass<'p> {
-    fn new(asked: &[String], wanted: Option<&'p [String]>, budget: &'p Budget) -> Self {
+    fn new(asked: &[String], wanted: Option<&'p [String]>, files: &'p Files<'_>) -> Self {
+        let mut entries: Vec<Entry> = Vec::with_capacity(asked.len());
+        for text in asked {
+            let entry = Entry { text: text.clone() };
+            if !entries.iter().any(|known| known.label() == entry.label()) {
+                entries.push(entry);
+            }
+        }
         Self {
-            asked: asked.iter().map(|text| Entry { text: text.clone() }).collect(),
+            asked: entries,
             wanted,
-            budget,
+            budget: &files.budget,
+            effort: &files.effort,
             findings: Findings::default(),
             routes: HashMap::new(),
             decoders: HashMap::new(),
@@ -218,6 +230,7 @@ impl<'p> Pass<'p> {
                     let collecting = &mut self.findings.lanes[lane].collecting;
                     let manner = decoder.manner(collecting.takes_all());
                     outcome = outcome.and(collecting.take(message, &tree, manner, self.budget)?);
+                    self.effort.spend(message.data.len(), collecting.taken())?;
                 }
                 outcome
             }
@@ -230,7 +243,7 @@ impl<'p> Pass<'p> {
                 self.failure = Some((message.channel.topic.clone(), failed(why)));
                 Ok(())
             }
-            Err(why) => Err(Trouble::Topic(message.channel.topic.clone(), failed(why))),
+            Err(why) => Err(Trouble::Topic(message.channel.topic.clone(), Box::new(failed(why)))),
         }
     }
 
@@ -263,12 +276,16 @@ impl<'p> Pass<'p> {
         } else {
             for index in 0..self.asked.len() {
                 let entry = &self.asked[index];
-                let Some(field) = entry.field_of(&channel.topic).map(|field| field.map(str::to_owned)) else { continue };
+                let Some(field) = entry.field_of(&channel.topic).map(|field| field.map(str::to_owned)) else {
+                    continue;
+                };
                 let known = self.findings.lanes.iter().position(|lane| entry.is(lane));
                 let label = entry.label().to_owned();
                 match self.decoder(channel) {
                     Ok(decoder) => route.decoder = Some(decoder),
-                    Err(why) => return Err(Trouble::Topic(channel.topic.clone(), RecordingProblem::Encoding { why })),
+                    Err(why) => {
+                        return Err(Trouble::Topic(channel.topic.clone(), Box::new(RecordingProblem::Encoding { why })));
+                    }
                 }
                 let lane = known.unwrap_or_else(|| self.new_lane(label, field, channel));
                 route.lanes.push(lane);
@@ -291,7 +308,9 @@ impl<'p> Pass<'p> {
                     ways.push((inside.to_owned(), name.clone()));
                 }
                 let short = label.rsplit('/').next().unwrap_or_default();
-                if let Some(rest) = name.strip_prefix(short).filter(|rest| rest.is_empty() || rest.starts_with(['[', '.'])) {
+                if let Some(rest) =
+                    name.strip_prefix(short).filter(|rest| rest.is_empty() || rest.starts_with(['[', '.']))
+                {
                     ways.push((format!("data{rest}"), name.clone()));
                 }
                 ways

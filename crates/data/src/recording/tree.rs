@@ -300,7 +300,11 @@ mod tests {
         assert_eq!(value(Number::Double, &(-0.1_f64).to_be_bytes(), true), -0.1);
         assert_eq!((value(Number::Bool, &[7], false), value(Number::Bool, &[0], false)), (1.0, 0.0));
         assert_eq!(Number::Unsigned(8).whole(&u64::MAX.to_le_bytes(), false), None);
-        let array = Array { number: Number::Double, big: false, bytes: &[1.0_f64.to_le_bytes(), 2.0_f64.to_le_bytes()].concat() };
+        let array = Array {
+            number: Number::Double,
+            big: false,
+            bytes: &[1.0_f64.to_le_bytes(), 2.0_f64.to_le_bytes()].concat(),
+        };
         let mut values = Vec::new();
         array.append_to(&mut values);
         assert_eq!((array.len(), values), (2, vec![1.0, 2.0]));

@@ -116,7 +116,9 @@ impl Descriptors {
                     "google.protobuf.Timestamp" | "google.protobuf.Duration" => Kind::Time,
                     name => match all.places.get(name) {
                         Some(&place) => Kind::Message(place),
-                        None => return Err(format!("need the type `{name}`, which the descriptors in the recording lack")),
+                        None => {
+                            return Err(format!("need the type `{name}`, which the descriptors in the recording lack"));
+                        }
                     },
                 };
                 message.places.insert(field.number, message.fields.len());

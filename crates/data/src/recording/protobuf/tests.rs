@@ -45,7 +45,8 @@ fn set(messages: &[Vec<u8>]) -> Vec<u8> {
 }
 
 fn descriptors() -> Vec<u8> {
-    let time = bytes(1, &[bytes(2, b"google.protobuf"), bytes(4, &message("Timestamp", &[])), bytes(12, b"proto3")].concat());
+    let time =
+        bytes(1, &[bytes(2, b"google.protobuf"), bytes(4, &message("Timestamp", &[])), bytes(12, b"proto3")].concat());
     let own = set(&[
         message(
             "All",
@@ -77,7 +78,8 @@ fn fields_are_read_by_their_numbers_and_absent_ones_are_zero() {
     let packed = [1.0_f64, 2.0].map(f64::to_le_bytes).concat();
     let inner = bytes(5, &[bytes(1, b"j"), double(2, 0.5)].concat());
     let counts = bytes(7, &[varint(3), varint(u64::MAX)].concat());
-    let whole = [stamp, double(2, -1.5), bytes(3, &packed), number(4, 5), inner, number(6, 1), counts, number(99, 1)].concat();
+    let whole =
+        [stamp, double(2, -1.5), bytes(3, &packed), number(4, 5), inner, number(6, 1), counts, number(99, 1)].concat();
     let tree = read(&descriptors, &whole).unwrap();
     assert_eq!(tree.get("x"), Some(&Tree::Number(-1.5)));
     let Some(Tree::Array(list)) = tree.get("list") else { panic!("{tree:?}") };
@@ -87,7 +89,10 @@ fn fields_are_read_by_their_numbers_and_absent_ones_are_zero() {
     assert_eq!(tree.get("counts"), Some(&Tree::List(vec![Tree::Whole(3), Tree::Whole(-1)])));
     assert_eq!(tree.get("maybe"), None);
     assert_eq!(tree.get("inner").unwrap().list().unwrap()[0].get("position"), Some(&Tree::Number(0.5)));
-    assert_eq!(crate::recording::numbers::stamp(&tree), Some(crate::recording::numbers::Stamp::Nanoseconds(12_000_000_034)));
+    assert_eq!(
+        crate::recording::numbers::stamp(&tree),
+        Some(crate::recording::numbers::Stamp::Nanoseconds(12_000_000_034))
+    );
     let empty = read(&descriptors, &[]).unwrap();
     assert_eq!((empty.get("x"), empty.get("whole")), (Some(&Tree::Number(0.0)), Some(&Tree::Whole(0))));
     assert_eq!((empty.get("list"), empty.get("text")), (Some(&Tree::List(vec![])), None));

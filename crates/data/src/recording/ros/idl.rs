@@ -20,7 +20,8 @@ const MOST_WORDS: usize = 1 << 20;
 /// # Errors
 /// What cannot be understood, as the end of a sentence.
 pub fn parse(text: &str) -> Result<Types, String> {
-    let mut parser = Parser { words: words(text)?, at: 0, modules: Vec::new(), types: Types::new(), aliases: BTreeMap::new() };
+    let mut parser =
+        Parser { words: words(text)?, at: 0, modules: Vec::new(), types: Types::new(), aliases: BTreeMap::new() };
     while parser.at < parser.words.len() {
         parser.definition()?;
     }
@@ -357,9 +358,22 @@ mod tests {
 
     #[test]
     fn what_makes_no_sense_is_refused_and_ends() {
-        for text in ["struct", "struct A {", "struct A { float", "union A {};", "module", "struct A { unsigned x; };",
-            "struct A { sequence<sequence<float>> x; };", "struct A { float x[0]; };", "typedef float", "@", "@a(",
-            "\"", "struct A { a::", "/*"] {
+        for text in [
+            "struct",
+            "struct A {",
+            "struct A { float",
+            "union A {};",
+            "module",
+            "struct A { unsigned x; };",
+            "struct A { sequence<sequence<float>> x; };",
+            "struct A { float x[0]; };",
+            "typedef float",
+            "@",
+            "@a(",
+            "\"",
+            "struct A { a::",
+            "/*",
+        ] {
             let outcome = parse(text);
             assert!(outcome.is_err() || outcome.is_ok_and(|types| types.is_empty()), "{text}");
         }

@@ -15,9 +15,8 @@ use definition::Definition;
 pub fn definition(name: &str, language: &str, text: &str) -> Result<Definition, String> {
     let name = definition::plain(name);
     let types = match language {
-        _ if text.trim().is_empty() => known::types(&name).ok_or_else(|| {
-            format!("are of type `{name}`, whose definition is neither in the recording nor known")
-        })?,
+        _ if text.trim().is_empty() => known::types(&name)
+            .ok_or_else(|| format!("are of type `{name}`, whose definition is neither in the recording nor known"))?,
         "ros2msg" => msg::parse(&name, text)?,
         "ros2idl" => idl::parse(text)?,
         other => return Err(format!("are described in `{other}`; known: ros2msg, ros2idl")),

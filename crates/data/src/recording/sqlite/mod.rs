@@ -39,6 +39,9 @@ fn damaged(what: &str) -> Problem {
     Problem::Wrong(format!("the database is damaged: {what}"))
 }
 
+/// What is done with each row: its number, and its values.
+type EachRow<'e, E> = dyn FnMut(i64, &[Value<'_>]) -> Result<(), E> + 'e;
+
 /// A table and its columns.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Table {
@@ -108,11 +111,7 @@ impl<R: Read + Seek> Database<R> {
     }
 
     /// Calls `each` with the number and values of each row of the tree at `root`.
-    fn walk<E: From<Problem>>(
-        &mut self,
-        root: u32,
-        each: &mut dyn FnMut(i64, &[Value<'_>]) -> Result<(), E>,
-    ) -> Result<(), E> {
+    fn walk<E: From<Problem>>(&mut self, root: u32, each: &mut EachRow<'_, E>) -> Result<(), E> {
         let mut visits = self.pages.count();
         let mut overflows = u64::from(self.pages.count());
         let mut waiting = vec![root];
@@ -161,7 +160,9 @@ fn columns(sql: &str) -> (Vec<String>, Option<usize>) {
         let name = part.split_whitespace().next().unwrap_or_default();
         let upper = part.to_ascii_uppercase();
         let first = upper.split_whitespace().next().unwrap_or_default();
-        if ["CONSTRAINT", "PRIMARY", "UNIQUE", "CHECK", "FOREIGN"].contains(&first.split('(').next().unwrap_or_default()) {
+        if ["CONSTRAINT", "PRIMARY", "UNIQUE", "CHECK", "FOREIGN"]
+            .contains(&first.split('(').next().unwrap_or_default())
+        {
             continue;
         }
         let words: Vec<&str> = upper.split_whitespace().collect();

@@ -70,7 +70,8 @@ impl<'p> Cells<'p> {
 
     /// The rows on a leaf.
     pub fn rows(&self, usable: u32) -> impl Iterator<Item = Result<Cell<'p>, Problem>> + '_ {
-        (0..self.count).map(move |index| self.row(index, usable).ok_or_else(|| damaged("a row does not fit on its page")))
+        (0..self.count)
+            .map(move |index| self.row(index, usable).ok_or_else(|| damaged("a row does not fit on its page")))
     }
 
     fn row(&self, index: usize, usable: u32) -> Option<Cell<'p>> {
