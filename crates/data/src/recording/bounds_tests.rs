@@ -72,7 +72,7 @@ fn a_file_of_64_kilobytes_ends_soon_and_holds_little() {
         ("truths", packed(&json(std::iter::repeat_n(truths, 45)))),
         ("deep and wide", packed(&json(std::iter::repeat_n(deep, 2000)))),
         ("tiny messages", packed(&json((0..7000).map(|_| "{\"a\":1}".to_owned())))),
-        ("names in all orders", packed(&json((0..60).map(|k| format!("{{{}}}", names(k, 60_000).join(",")))))),
+        ("names in other orders", packed(&json((0..8).map(|k| format!("{{{}}}", names(k, 600).join(",")))))),
         ("new names in each message", plain(&json((0..1000).map(|k| format!("{{\"n{k}\":1}}"))))),
         ("thousands of names", plain(&json((0..4).map(|k| format!("{{{}}}", names(k, 2000).join(",")))))),
         ("lists of nothing", packed(&records(["p/T", "ros2msg"], definition, "cdr", std::iter::repeat_n(cdr, 60)))),

@@ -13,7 +13,7 @@ use crate::budget::Budget;
 /// Messages may hold so many different sets of names; beyond them each name has a track of its own.
 const MOST_TRACKS: usize = 64;
 /// Bytes of all shapes that are remembered.
-const MOST_SHAPE_BYTES: usize = 4 << 20;
+const MOST_SHAPE_BYTES: usize = 1 << 20;
 /// A message without a stamp.
 pub const NO_STAMP: i64 = i64::MIN;
 
@@ -288,9 +288,11 @@ impl Collecting {
         }
         let columns: Rc<[u32]> = pairs.iter().map(|pair| pair.0).collect();
         let order: Box<[u32]> = pairs.iter().map(|pair| pair.1).collect();
-        if self.tracks_by_columns.contains_key(&columns) || self.tracks.len() < MOST_TRACKS {
+        let known = self.tracks_by_columns.get(&columns).copied();
+        if known.is_some() || self.tracks.len() < MOST_TRACKS {
             let straight = order.len() == numbers.values.len() && order.is_sorted();
-            return Ok(Ok(vec![Part { track: self.track(columns, budget)?, order, straight }]));
+            let track = known.map_or_else(|| self.track(columns, budget), Ok)?;
+            return Ok(Ok(vec![Part { track, order, straight }]));
         }
         let mut alone = Vec::with_capacity(pairs.len());
         for (column, place) in pairs {
@@ -350,7 +352,8 @@ impl Track {
         let Ok(messages) = usize::try_from(messages) else { return };
         let values = messages.saturating_mul(width);
         // A four-hundredth of what the file may be turned into is some times its size.
-        if 8 * (values as u64).saturating_add(messages as u64) <= budget.left() / 400 {
+        let bytes = 8_u64.saturating_mul((values as u64).saturating_add(messages as u64));
+        if bytes <= budget.left() / 400 {
             self.values.reserve_exact(values);
             self.logged.reserve_exact(messages);
             self.stamps.reserve_exact(if stamp == NO_STAMP { 0 } else { messages });

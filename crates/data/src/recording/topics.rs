@@ -284,7 +284,10 @@ impl<'p> Pass<'p> {
                 match self.decoder(channel) {
                     Ok(decoder) => route.decoder = Some(decoder),
                     Err(why) => {
-                        return Err(Trouble::Topic(channel.topic.clone(), Box::new(RecordingProblem::Encoding { why })));
+                        return Err(Trouble::Topic(
+                            channel.topic.clone(),
+                            Box::new(RecordingProblem::Encoding { why }),
+                        ));
                     }
                 }
                 let lane = known.unwrap_or_else(|| self.new_lane(label, field, channel));
