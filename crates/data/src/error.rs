@@ -6,6 +6,7 @@ use std::path::Path;
 use miette::{Diagnostic, NamedSource, SourceSpan};
 
 use crate::budget::OverBudget;
+use crate::recording::RecordingProblem;
 
 /// A data file that cannot be read or written.
 #[derive(Debug, thiserror::Error, Diagnostic)]
@@ -357,125 +358,6 @@ impl LineProblem {
             Self::NotFinite { .. } => "not a finite number".to_owned(),
         }
     }
-}
-
-/// What is wrong with a recording.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum RecordingProblem {
-    /// Other contents.
-    #[error("this is not an MCAP file")]
-    NotMcap,
-
-    /// A format that did not exist when this was written.
-    #[error("version {found} of MCAP; known: 0")]
-    Version {
-        /// The version, a character.
-        found: String,
-    },
-
-    /// No end.
-    #[error("the recording is cut off")]
-    CutOff,
-
-    /// Contents that contradict themselves.
-    #[error("the recording is damaged: {0}")]
-    Damaged(&'static str),
-
-    /// A chunk that cannot be unpacked.
-    #[error("a chunk cannot be unpacked ({compression}): {message}")]
-    Compression {
-        /// How it is packed.
-        compression: String,
-        /// What is wrong with it.
-        message: String,
-    },
-
-    /// A way to pack chunks that is not known.
-    #[error("its chunks are packed as `{}`; known: zstd, lz4, and unpacked ones", super::excerpt::shortened(found))]
-    UnknownCompression {
-        /// How they are packed.
-        found: String,
-    },
-
-    /// A file that fills the memory.
-    #[error("it promises to unpack to {unpacked} bytes; a file of its size may unpack to {allowed}")]
-    TooLarge {
-        /// What it says.
-        unpacked: u64,
-        /// What is granted.
-        allowed: u64,
-    },
-
-    /// No messages at all.
-    #[error("the recording holds no messages")]
-    Empty,
-
-    /// A topic that is not there.
-    #[error("there is no topic `{found}`")]
-    NoTopic {
-        /// What is asked for.
-        found: String,
-        /// What there is.
-        topics: String,
-    },
-
-    /// Several topics, and none asked for.
-    #[error("it is not clear which topic is meant")]
-    WhichTopic {
-        /// What there is.
-        topics: String,
-    },
-
-    /// Messages that are not JSON.
-    #[error("messages of {topic} are encoded as `{}`; needed: json", super::excerpt::shortened(found))]
-    Encoding {
-        /// The topic.
-        topic: String,
-        /// Their encoding.
-        found: String,
-    },
-
-    /// A message that is not like the first.
-    #[error("message {number}, of {time} s, {message}")]
-    Message {
-        /// Its number among all of the file.
-        number: usize,
-        /// When it was logged, in seconds.
-        time: String,
-        /// What is wrong with it.
-        message: String,
-    },
-
-    /// Messages without numbers.
-    #[error("the messages hold no numbers")]
-    NoNumbers,
-
-    /// A channel that is asked for, but not there.
-    #[error("there is no channel `{found}`")]
-    NoChannel {
-        /// What is asked for.
-        found: String,
-        /// What there is.
-        channels: String,
-    },
-
-    /// Messages at uneven times, and no period.
-    #[error("sequence {sequence}: {message}; steps are equally spaced")]
-    Uneven {
-        /// The sequence.
-        sequence: String,
-        /// What was found.
-        message: String,
-    },
-
-    /// A period that does not suit the messages.
-    #[error("sequence {sequence}: {message}")]
-    Resampling {
-        /// The sequence.
-        sequence: String,
-        /// What was found.
-        message: String,
-    },
 }
 
 /// What is wrong with a numpy array.

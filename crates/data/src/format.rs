@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::budget::Budget;
 use crate::samples::Samples;
-use crate::{Field, FileError, Selection, mcap, npy, npz, table};
+use crate::{Field, FileError, Selection, npy, npz, recording, table};
 
 /// One format.
 pub struct Format {
@@ -75,7 +75,23 @@ pub const FORMATS: &[Format] = &[
         extensions: &["mcap"],
         folder: None,
         options: &["topics", "time", "period"],
-        read: mcap::read,
+        read: recording::read,
+        write: None,
+    },
+    Format {
+        name: "ROS 2 bag",
+        extensions: &["db3"],
+        folder: Some(recording::is_bag),
+        options: &["topics", "time", "period"],
+        read: recording::read,
+        write: None,
+    },
+    Format {
+        name: "ROS 1 bag",
+        extensions: &["bag"],
+        folder: None,
+        options: &["topics", "time", "period"],
+        read: recording::refuse_ros1,
         write: None,
     },
 ];

@@ -5,7 +5,7 @@
 //! | `.csv`, `.txt`, `.dat`, `.tsv` | lines of numbers, with or without a header | [`table`] |
 //! | `.npy` | one numpy array: sequences x steps x channels, steps x channels, or steps | [`npy`] |
 //! | `.npz` | numpy arrays: sequences, or groups of channels | [`npz`] |
-//! | `.mcap` | a recording; messages of one topic are samples. Only read | [`mcap`] |
+//! | `.mcap`, `.db3`, folders of bags | a recording; messages are samples. Only read | [`recording`] |
 //!
 //! A format is one file and one line in [`format::FORMATS`]. Each reader gets a [`format::Source`] with a
 //! [`budget::Budget`] and makes [`samples::Samples`]; from there [`samples::Samples::finish`] is the one way to a
@@ -27,10 +27,10 @@ mod files;
 pub mod format;
 mod joining;
 mod literal;
-mod mcap;
 mod npy;
 mod npz;
 mod reading;
+mod recording;
 mod remark;
 mod replace;
 pub mod samples;
@@ -39,10 +39,11 @@ pub mod suspicions;
 mod table;
 pub mod times;
 
-pub use error::{ArrayProblem, FileError, LineError, LineProblem, RecordingProblem, disk_help};
+pub use error::{ArrayProblem, FileError, LineError, LineProblem, disk_help};
 pub use files::{expand, natural};
 pub use joining::read_all;
 pub use reading::{Facts, Gap, Reading, Topic};
+pub use recording::RecordingProblem;
 pub use remark::{Level, Remark};
 pub use replace::{HALF_WRITTEN, replace};
 pub use selection::{Axes, Missing, Selection, TimeSource};

@@ -29,7 +29,7 @@ fn good_files_are_read_in_a_small_multiple_of_their_size() {
         ("x.txt", table::writing::blocks(&fields).into_bytes(), 10),
         ("x.npy", npy::write("x.npy", &fields).unwrap(), 5),
         ("x.npz", npz::write("x.npz", &fields).unwrap(), 5),
-        ("x.mcap", mcap::tests::some_joints(), 50),
+        ("x.mcap", recording::tests::some_joints(), 50),
     ];
     for (name, bytes, factor) in files {
         let held = held(name, &bytes);
@@ -53,7 +53,7 @@ fn promises_of_terabytes_cost_nothing() {
             npz[at..at + 4].copy_from_slice(&0xffff_fff0_u32.to_le_bytes());
         }
     }
-    let mut mcap = mcap::tests::some_joints();
+    let mut mcap = recording::tests::some_joints();
     let chunk = mcap.windows(9).position(|window| window[0] == 0x06 && window[7..9] == [0, 0]).unwrap();
     mcap[chunk + 25..chunk + 33].copy_from_slice(&(1_u64 << 42).to_le_bytes());
     for (name, bytes) in [("x.npy", npy), ("x.npz", npz), ("x.mcap", mcap)] {

@@ -203,7 +203,7 @@ fn garbage_never_makes_a_reader_panic() {
         b"PK\x03\x04",
     ]);
 
-    let mcap = [mcap::tests::some_joints()];
+    let mcap = [recording::tests::some_joints()];
     let records =
         "\x01 \x02 \x03 \x04 \x05 \x06 \0 \0\0\0 {\"joints\":[ {\"name\":\"a\", \"position\":1} ]} zstd lz4 json /a";
     let mut record_pieces: Vec<&[u8]> = records.split(' ').map(str::as_bytes).collect();

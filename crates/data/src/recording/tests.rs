@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 use std::io::{Cursor, Write};
+use std::path::Path;
 
-use mcap::records::MessageHeader;
-use mcap::{WriteOptions, Writer};
+use ::mcap::records::MessageHeader;
+use ::mcap::{WriteOptions, Writer};
 
 use super::*;
 use crate::error::FileError;
@@ -131,7 +132,7 @@ fn the_topic_is_the_one_that_is_asked_for_or_the_only_one() {
     assert_eq!(message, "r.mcap: there is no topic `/joints`");
     assert!(help.contains("/joint_states (10 messages, json"), "{help}");
     let (message, _) = said(&bytes, &select(Some("/binary"), None, None));
-    assert_eq!(message, "r.mcap: messages of /binary are encoded as `protobuf`; needed: json");
+    assert_eq!(message, "r.mcap, topic /binary: its messages are protobuf, but described in `jsonschema`");
     // What the network was told is what to learn from.
     messages.push(("/sensed", 900, r#"{"timestamp":{"sec":0,"nsec":900},"z":1,"a":2}"#.into()));
     let data = read_bytes("r.mcap", &recording(plain(), &messages), &Selection::default()).unwrap();
@@ -154,23 +155,33 @@ fn channels_are_taken_by_name_in_the_order_that_is_asked_for() {
     );
 }
 
+/// What the reader makes of a recording, before it becomes a data set.
+fn samples(bytes: &[u8], selection: &Selection) -> crate::samples::Samples {
+    read(&Source::of_bytes(Path::new("r.mcap"), bytes), selection).unwrap()
+}
+
 #[test]
-fn a_message_that_is_not_like_the_first_is_named() {
+fn what_a_message_does_not_hold_is_missing_and_what_it_holds_wrongly_is_named() {
     let mut messages = ten();
     messages[7].2 = r#"{"joints":[{"name":"elbow","position":1}]}"#.into();
-    let (message, _) = said(&recording(plain(), &messages), &Selection::default());
-    assert_eq!(message, "r.mcap, topic /joint_states: message 8, of 0.0000007 s, holds no `wrist`, as the first does");
-    assert_eq!(values(&recording(plain(), &messages), &select(None, None, Some(&["elbow"]))).len(), 10);
+    let bytes = recording(plain(), &messages);
+    let track = samples(&bytes, &Selection::default()).tracks.remove(0);
+    assert_eq!(track.values.iter().position(|value| value.is_nan()), Some(15));
+    assert_eq!((track.values[14], track.values.len()), (1.0, 20));
+    assert_eq!(values(&bytes, &select(None, None, Some(&["elbow"]))).len(), 10);
     messages[7].2 =
         r#"{"joints":[{"name":"elbow","position":1},{"name":"x","position":1},{"name":"wrist","position":1}]}"#.into();
-    let (message, _) = said(&recording(plain(), &messages), &Selection::default());
-    assert!(message.ends_with("holds `x`, which the first does not"), "{message}");
+    let read = samples(&recording(plain(), &messages), &Selection::default());
+    assert_eq!(read.channels, ["elbow", "wrist", "x"]);
+    assert_eq!(read.tracks[0].values.iter().filter(|value| value.is_nan()).count(), 9);
     messages[7].2 = "{}".into();
-    assert!(said(&recording(plain(), &messages), &Selection::default()).0.contains("message 8"));
+    let read = samples(&recording(plain(), &messages), &Selection::default());
+    assert!(read.remarks.iter().any(|remark| remark.to_string().contains("1 messages hold none of the channels")));
     messages[7].2 = r#"{"joints":[{"name":"elbow","position":1},{"name":"wrist","position":null}]}"#.into();
-    assert!(
-        said(&recording(plain(), &messages), &Selection::default()).0.ends_with("holds no position of joint `wrist`")
-    );
+    assert!(samples(&recording(plain(), &messages), &Selection::default()).tracks[0].values[15].is_nan());
+    messages[7].2 = r#"{"joints":[{"name":"elbow","position":1},{"name":"wrist","position":"up"}]}"#.into();
+    let (message, _) = said(&recording(plain(), &messages), &Selection::default());
+    assert_eq!(message, "r.mcap, topic /joint_states: message 8, of 0.0000007 s, holds no position of joint `wrist`");
     let (message, _) = said(&recording(plain(), &[("/a", 0, "{}".into())]), &Selection::default());
     assert_eq!(message, "r.mcap, topic /a: the messages hold no numbers");
 }
@@ -183,11 +194,11 @@ fn messages_are_ordered_by_time_and_resampled() {
     assert_eq!(values(&bytes, &select(None, None, Some(&["elbow"]))), (0..10).map(f64::from).collect::<Vec<_>>());
     assert_eq!(values(&bytes, &select(None, Some(200e-9), Some(&["elbow"]))), [0., 2., 4., 6., 8.]);
     assert_eq!(values(&bytes, &select(None, Some(150e-9), Some(&["elbow"]))), [0., 1.5, 3., 4.5, 6., 7.5, 9.]);
-    messages[5].1 += 30;
+    messages[5].1 += 60;
     let bytes = recording(plain(), &messages);
     let (message, help) = said(&bytes, &Selection::default());
-    assert!(message.contains("sequence 1: messages come every 0.0000001 s in the middle, but"), "{message}");
-    assert!(help.contains("--period"), "{help}");
+    assert!(message.contains("sequence 1: samples are 0.0000001 s apart in the middle, but"), "{message}");
+    assert!(help.contains("period = 0.0000001"), "{help}");
     assert_eq!(values(&bytes, &select(None, Some(100e-9), None)).len(), 20);
 }
 
