@@ -6,6 +6,7 @@ use std::path::Path;
 use miette::{Diagnostic, NamedSource, SourceSpan};
 
 use crate::budget::OverBudget;
+use crate::problem::FormatProblem;
 
 /// A data file that cannot be read or written.
 #[derive(Debug, thiserror::Error, Diagnostic)]
@@ -247,6 +248,18 @@ pub enum FileError {
         shortest: usize,
         /// Most samples.
         longest: usize,
+    },
+
+    /// A file of a format that others made.
+    #[error("{path}: {problem}")]
+    Format {
+        /// The file.
+        path: String,
+        /// What is wrong.
+        problem: Box<FormatProblem>,
+        /// What to do.
+        #[help]
+        help: Option<String>,
     },
 
     /// Values that make no data set.

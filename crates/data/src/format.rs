@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::budget::Budget;
 use crate::samples::Samples;
-use crate::{Field, FileError, Selection, mcap, npy, npz, table};
+use crate::{Field, FileError, Selection, lerobot, mcap, npy, npz, table};
 
 /// One format.
 pub struct Format {
@@ -76,6 +76,14 @@ pub const FORMATS: &[Format] = &[
         folder: None,
         options: &["topics", "time", "period"],
         read: mcap::read,
+        write: None,
+    },
+    Format {
+        name: "LeRobot data set or parquet table",
+        extensions: &["parquet"],
+        folder: Some(lerobot::is_folder),
+        options: &["arrays", "period"],
+        read: lerobot::read,
         write: None,
     },
 ];

@@ -6,6 +6,7 @@
 //! | `.npy` | one numpy array: sequences x steps x channels, steps x channels, or steps | [`npy`] |
 //! | `.npz` | numpy arrays: sequences, or groups of channels | [`npz`] |
 //! | `.mcap` | a recording; messages of one topic are samples. Only read | [`mcap`] |
+//! | `.parquet`, folders of LeRobot | a data set of demonstrations, or a table in columns | [`lerobot`] |
 //!
 //! A format is one file and one line in [`format::FORMATS`]. Each reader gets a [`format::Source`] with a
 //! [`budget::Budget`] and makes [`samples::Samples`]; from there [`samples::Samples::finish`] is the one way to a
@@ -25,11 +26,15 @@ mod error;
 mod excerpt;
 mod files;
 pub mod format;
+mod front;
 mod joining;
+mod lerobot;
 mod literal;
 mod mcap;
 mod npy;
 mod npz;
+mod parquet;
+mod problem;
 mod reading;
 mod remark;
 mod replace;
@@ -38,10 +43,12 @@ mod selection;
 pub mod suspicions;
 mod table;
 pub mod times;
+mod unpack;
 
 pub use error::{ArrayProblem, FileError, LineError, LineProblem, RecordingProblem, disk_help};
 pub use files::{expand, natural};
 pub use joining::read_all;
+pub use problem::FormatProblem;
 pub use reading::{Facts, Gap, Reading, Topic};
 pub use remark::{Level, Remark};
 pub use replace::{HALF_WRITTEN, replace};
@@ -103,8 +110,12 @@ pub fn inspect_bytes(path: &Path, bytes: &[u8], selection: &Selection) -> Result
 fn read_source(format: &Format, source: &Source<'_>, selection: &Selection) -> Result<Reading, FileError> {
     format.check(source.name(), selection)?;
     let mut samples = (format.read)(source, selection)?;
-    samples.facts.format = format.name.to_owned();
-    samples.facts.files = vec![source.name().to_owned()];
+    if samples.facts.format.is_empty() {
+        samples.facts.format = format.name.to_owned();
+    }
+    if samples.facts.files.is_empty() {
+        samples.facts.files = vec![source.name().to_owned()];
+    }
     samples.finish(source.name(), selection)
 }
 
@@ -136,3 +147,5 @@ pub fn csv(fields: &[Field<'_>]) -> String {
 mod memory_tests;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_random;

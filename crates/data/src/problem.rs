@@ -1,5 +1,6 @@
 //! What can be wrong with files of formats that others made: parquet, HDF5, MATLAB, motion capture, labelled series.
 
+use crate::FileError;
 use crate::budget::OverBudget;
 
 /// What is wrong with a file of a format that others made.
@@ -95,6 +96,15 @@ impl FormatProblem {
             Self::NoSuch { there, .. } if !there.is_empty() => Some(format!("there are {there}")),
             Self::Damaged { .. } => Some("copy or write the file again".to_owned()),
             _ => None,
+        }
+    }
+
+    /// The problem of the file at `path`.
+    #[must_use]
+    pub fn at(self, path: &str) -> FileError {
+        match self {
+            Self::OverBudget(problem) => FileError::OverBudget { path: path.to_owned(), problem },
+            problem => FileError::Format { path: path.to_owned(), help: problem.help(), problem: Box::new(problem) },
         }
     }
 }

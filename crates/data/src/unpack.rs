@@ -99,7 +99,10 @@ mod tests {
     fn snappy_knows_stretches_and_copies() {
         // "ab", then 6 bytes from 2 before, then "c".
         let packed = [9, 1 << 2, b'a', b'b', 2 << 2 | 1, 2, 0, b'c'];
-        assert_eq!(Packing::Snappy.unpack(&packed, 9).unwrap().as_ref(), b"abababab c".map(|b| b).split(|b| *b == b' ').collect::<Vec<_>>().concat());
+        assert_eq!(
+            Packing::Snappy.unpack(&packed, 9).unwrap().as_ref(),
+            b"abababab c".map(|b| b).split(|b| *b == b' ').collect::<Vec<_>>().concat()
+        );
         // A stretch of 61 bytes has its length behind the tag.
         let mut long = vec![61, 60 << 2, 60];
         long.extend([7; 61]);

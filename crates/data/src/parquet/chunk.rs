@@ -72,8 +72,9 @@ fn packing(codec: Option<i64>) -> Result<Packing, FormatProblem> {
     };
     Err(FormatProblem::NotRead {
         found: format!("it is packed by {name}"),
-        help: "in Python: `import pyarrow.parquet as pq; pq.write_table(pq.read_table(OLD), NEW, compression=\"snappy\")`"
-            .to_owned(),
+        help:
+            "in Python: `import pyarrow.parquet as pq; pq.write_table(pq.read_table(OLD), NEW, compression=\"snappy\")`"
+                .to_owned(),
     })
 }
 
@@ -116,7 +117,10 @@ impl Column<'_> {
                 };
                 let read = || Some((levels(self.leaf.lists)?, levels(self.leaf.optional)?));
                 let (repetition, definition) = { read }().ok_or_else(|| damaged("a page's levels end early"))?;
-                if [(repetition, 4), (definition, 3)].iter().any(|&(there, at)| there.is_some() && about.int(at) != Some(3)) {
+                if [(repetition, 4), (definition, 3)]
+                    .iter()
+                    .any(|&(there, at)| there.is_some() && about.int(at) != Some(3))
+                {
                     return Err(damaged("levels in an encoding that nobody writes"));
                 }
                 let page = page(about, 2, repetition, definition, front.0)?;
@@ -133,11 +137,7 @@ impl Column<'_> {
                 let size = size.checked_sub(repetition.len() + definition.len());
                 let size = size.ok_or_else(|| damaged("a page is smaller than its levels"))?;
                 let plain = about.field(7) == Some(&Value::Bool(false));
-                let unpacked = if plain {
-                    front.0.into()
-                } else {
-                    self.unpack(front.0, size)?
-                };
+                let unpacked = if plain { front.0.into() } else { self.unpack(front.0, size)? };
                 let repetition = (self.leaf.lists > 0).then_some(Front(repetition));
                 let definition = (self.leaf.optional > 0).then_some(Front(definition));
                 let page = page(about, 4, repetition, definition, &unpacked)?;
@@ -151,7 +151,8 @@ impl Column<'_> {
                 let unpacked = self.unpack(packed, size)?;
                 self.budget.take_values::<f64>(count)?;
                 self.dictionary.clear();
-                plain(self.leaf, &unpacked, count, &mut self.dictionary).ok_or_else(|| damaged("a dictionary ends early"))?;
+                plain(self.leaf, &unpacked, count, &mut self.dictionary)
+                    .ok_or_else(|| damaged("a dictionary ends early"))?;
                 self.budget.give_back(unpacked.len());
                 Ok(left)
             }
@@ -179,13 +180,15 @@ impl Column<'_> {
         let levels = |front: Option<Front<'_>>, most: u32| -> Result<Option<Vec<u8>>, FormatProblem> {
             let Some(front) = front else { return Ok(None) };
             let mut levels = Vec::new();
-            hybrid(front, u32::BITS - most.leading_zeros(), page.count, |level| levels.push(level as u8)).ok_or_else(broken)?;
+            hybrid(front, u32::BITS - most.leading_zeros(), page.count, |level| levels.push(level as u8))
+                .ok_or_else(broken)?;
             if levels.iter().any(|&level| u32::from(level) > most) { Err(broken()) } else { Ok(Some(levels)) }
         };
         let repetition = levels(page.repetition, leaf.lists)?;
         let definition = levels(page.definition, leaf.optional)?;
         let full = leaf.optional as u8;
-        let there = definition.as_ref().map_or(page.count, |levels| levels.iter().filter(|&&level| level == full).count());
+        let there =
+            definition.as_ref().map_or(page.count, |levels| levels.iter().filter(|&&level| level == full).count());
         let first = self.cells.values.len();
         self.values(page, there)?;
         if repetition.is_none() && there == page.count {

@@ -17,7 +17,6 @@ mod chunk;
 mod encoding;
 mod schema;
 mod thrift;
-//pub mod write;
 
 pub use schema::Leaf;
 
@@ -56,10 +55,10 @@ impl Cells {
         &self.values[from..self.ends[row]]
     }
 
-    /// Bytes that it holds.
+    /// Bytes that were taken for it from a budget, to be given back with it.
     #[must_use]
-    pub fn bytes(&self) -> usize {
-        self.values.capacity() * size_of::<f64>() + self.ends.capacity() * size_of::<usize>()
+    pub fn taken(&self) -> usize {
+        self.values.len() * size_of::<f64>() + self.ends.len() * size_of::<usize>()
     }
 }
 
@@ -75,7 +74,10 @@ impl<'a> Parquet<'a> {
         }
         if bytes.starts_with(b"version https://git-lfs") {
             let help = "`git lfs pull` in its folder fetches the data".to_owned();
-            return Err(FormatProblem::NotRead { found: "it is a pointer that Git LFS left in place of the data".to_owned(), help });
+            return Err(FormatProblem::NotRead {
+                found: "it is a pointer that Git LFS left in place of the data".to_owned(),
+                help,
+            });
         }
         if !bytes.starts_with(MAGIC) {
             return Err(FormatProblem::NotThis { kind: KIND, why: "it does not begin with PAR1" });

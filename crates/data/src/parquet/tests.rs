@@ -29,7 +29,8 @@ fn column(name: &str, leaf: &str) -> Vec<Vec<f64>> {
 
 /// The rows that the script's rule makes: three episodes of 10, 12 and 8 frames.
 fn expected() -> Vec<Vec<f64>> {
-    let rows = [10, 12, 8].into_iter().enumerate().flat_map(|(e, steps)| (0..steps).map(move |t| (e as f64, f64::from(t))));
+    let rows =
+        [10, 12, 8].into_iter().enumerate().flat_map(|(e, steps)| (0..steps).map(move |t| (e as f64, f64::from(t))));
     rows.map(|(e, t)| (0..3).map(|c| 16.0 * e + t / 4.0 + f64::from(c) / 32.0).collect()).collect()
 }
 
@@ -44,7 +45,8 @@ fn every_way_in_which_pyarrow_writes_is_read() {
         assert_eq!(column(name, "observation.state"), expected, "{name}");
         let action: Vec<Vec<f64>> = column(name, "action").iter().map(|row| row.iter().map(|x| -x).collect()).collect();
         assert_eq!(action, expected, "{name}");
-        let episodes: Vec<Vec<f64>> = [10, 12, 8].iter().enumerate().flat_map(|(e, &n)| vec![vec![e as f64]; n]).collect();
+        let episodes: Vec<Vec<f64>> =
+            [10, 12, 8].iter().enumerate().flat_map(|(e, &n)| vec![vec![e as f64]; n]).collect();
         assert_eq!(column(name, "episode_index"), episodes, "{name}");
         let times: Vec<f64> = column(name, "timestamp").concat();
         assert_eq!(times[..3], [0.0, f64::from(0.02_f32), f64::from(0.04_f32)], "{name}");

@@ -1,0 +1,1 @@
+//! Writes LeRobot data sets.
