@@ -206,6 +206,50 @@ def hdf5(folder):
         file.create_dataset("packed", data=state(0, 3000), chunks=(4, 3), compression="gzip")
 
 
+    # Small files, which are kept beside the reader.
+    for name, libver in [("small", "earliest"), ("small_new", "latest")]:
+        with h5py.File(folder / f"{name}.hdf5", "w", libver=libver) as file:
+            file.create_group("data").attrs["env_args"] = json.dumps({"env_kwargs": {"control_freq": 20}})
+            for e, n in enumerate(lengths[:3]):
+                demo = file["data"].create_group(f"demo_{e}")
+                how = [{}, dict(chunks=(3, 2), compression="gzip", shuffle=True), dict(chunks=(2, 3), maxshape=(None, 3))][e]
+                demo.create_dataset("actions", data=-state(e, n), **how)
+                demo.create_dataset("obs/robot0_joint_pos", data=state(e, n), **how)
+                demo.create_dataset("obs/robot0_gripper_qpos", data=state(e, n, 2))
+    with h5py.File(folder / "indexes.h5", "w", libver="latest") as file:
+        q = state(0, 40)
+        file.create_dataset("fixed", data=q, chunks=(4, 2))
+        file.create_dataset("fixed_gzip", data=q, chunks=(4, 2), compression="gzip")
+        file.create_dataset("grown", data=q, chunks=(1, 2), maxshape=(None, 3))
+        file.create_dataset("grown_last", data=q, chunks=(2, 1), maxshape=(40, None))
+        file.create_dataset("grown_gzip", data=q, chunks=(1, 2), maxshape=(None, 3), compression="gzip")
+        file.create_dataset("grown_both", data=q, chunks=(4, 2), maxshape=(None, None))
+        file.create_dataset("grown_both_gzip", data=q, chunks=(4, 2), maxshape=(None, None), compression="gzip")
+        file.create_dataset("single", data=q, chunks=(40, 3))
+        file.create_dataset("single_gzip", data=q, chunks=(40, 3), compression="gzip")
+        file.create_dataset("shrunk", data=q, chunks=(4, 2), maxshape=(60, 3))
+        how = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        how.set_chunk((4, 2))
+        how.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+        space = h5py.h5s.create_simple((40, 3))
+        h5py.h5d.create(file.id, b"implicit", h5py.h5t.IEEE_F32LE, space, how).write(h5py.h5s.ALL, h5py.h5s.ALL, q)
+    with h5py.File(folder / "axes.h5", "w") as file:
+        file["sideways"] = state(0, 20).T
+        file["block"] = np.stack([state(0, 5), state(1, 5)])
+    with h5py.File(folder / "flags.h5", "w") as file:
+        file["observations"] = state(0, 12)
+        file["actions"] = -state(0, 12)
+        file["rewards"] = np.zeros(12)
+        file["terminals"] = np.arange(12) == 3
+        file["timeouts"] = np.arange(12) == 9
+    with h5py.File(folder / "matlab.mat", "w", userblock_size=512) as file:
+        file["q"] = state(0, 20, kind=np.float64).T
+        file["q"].attrs["MATLAB_class"] = np.bytes_("double")
+        file.create_group("#refs#")["a"] = np.zeros((3, 3))
+    with open(folder / "matlab.mat", "r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
+
+
 def matlab(folder):
     folder.mkdir()
     for name, how in [("packed", dict(do_compression=True)), ("plain", {})]:

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::budget::Budget;
 use crate::samples::Samples;
-use crate::{Field, FileError, Selection, lerobot, mcap, npy, npz, table};
+use crate::{Field, FileError, Selection, hdf5, lerobot, mcap, npy, npz, table};
 
 /// One format.
 pub struct Format {
@@ -84,6 +84,22 @@ pub const FORMATS: &[Format] = &[
         folder: Some(lerobot::is_folder),
         options: &["arrays", "period"],
         read: lerobot::read,
+        write: None,
+    },
+    Format {
+        name: "HDF5 file",
+        extensions: &["hdf5", "h5", "he5"],
+        folder: None,
+        options: &["arrays", "axes", "period"],
+        read: hdf5::read,
+        write: None,
+    },
+    Format {
+        name: "MATLAB file",
+        extensions: &["mat"],
+        folder: None,
+        options: &["arrays", "axes", "period"],
+        read: hdf5::read,
         write: None,
     },
 ];

@@ -27,6 +27,7 @@ mod excerpt;
 mod files;
 pub mod format;
 mod front;
+mod hdf5;
 mod joining;
 mod lerobot;
 mod literal;

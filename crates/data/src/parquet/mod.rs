@@ -18,6 +18,7 @@ mod encoding;
 mod schema;
 mod thrift;
 
+pub use encoding::half;
 pub use schema::Leaf;
 
 use thrift::Value;
