@@ -268,6 +268,7 @@ def matlab(folder):
         )
     scipy.io.savemat(folder / "sideways.mat", {"q": state(0, 20, kind=np.float64).T})
     scipy.io.savemat(folder / "cells.mat", {"trials": np.array([state(0, 5), state(1, 6)], dtype=object)})
+    scipy.io.savemat(folder / "structure.mat", {"s": {"q": state(0, 20), "name": "arm"}})
     scipy.io.savemat(folder / "v4.mat", {"q": state(0, 20, kind=np.float64)}, format="4")
 
 

@@ -250,6 +250,18 @@ pub enum FileError {
         longest: usize,
     },
 
+    /// A file of a format that is known, but not read.
+    #[error("{path} is {what}, which is not read here")]
+    #[diagnostic(help("{help}"))]
+    Elsewhere {
+        /// The file.
+        path: String,
+        /// What it is.
+        what: &'static str,
+        /// What turns it into one that is read.
+        help: String,
+    },
+
     /// A file of a format that others made.
     #[error("{path}: {problem}")]
     Format {

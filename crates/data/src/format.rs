@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::budget::Budget;
 use crate::samples::Samples;
-use crate::{Field, FileError, Selection, hdf5, lerobot, mcap, npy, npz, table};
+use crate::{Field, FileError, Selection, bvh, hdf5, lerobot, mat, mcap, npy, npz, series, table};
 
 /// One format.
 pub struct Format {
@@ -99,7 +99,23 @@ pub const FORMATS: &[Format] = &[
         extensions: &["mat"],
         folder: None,
         options: &["arrays", "axes", "period"],
-        read: hdf5::read,
+        read: mat::read,
+        write: None,
+    },
+    Format {
+        name: "motion capture (BVH)",
+        extensions: &["bvh"],
+        folder: None,
+        options: &["period"],
+        read: bvh::read,
+        write: None,
+    },
+    Format {
+        name: "labelled series (.ts)",
+        extensions: &["ts"],
+        folder: None,
+        options: &["period"],
+        read: series::read,
         write: None,
     },
 ];
@@ -118,7 +134,10 @@ impl Format {
         let known = extension
             .filter(|_| !is_folder)
             .and_then(|extension| FORMATS.iter().find(|format| format.extensions.contains(&extension.as_str())));
-        known.ok_or_else(|| FileError::Extension { path: path.display().to_string(), known: known_extensions() })
+        known.ok_or_else(|| {
+            crate::elsewhere::refusal(path)
+                .unwrap_or_else(|| FileError::Extension { path: path.display().to_string(), known: known_extensions() })
+        })
     }
 
     /// Whether the name of a file tells that it holds data.

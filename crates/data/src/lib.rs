@@ -7,6 +7,10 @@
 //! | `.npz` | numpy arrays: sequences, or groups of channels | [`npz`] |
 //! | `.mcap` | a recording; messages of one topic are samples. Only read | [`mcap`] |
 //! | `.parquet`, folders of LeRobot | a data set of demonstrations, or a table in columns | [`lerobot`] |
+//! | `.hdf5`, `.h5` | demonstrations, or any data sets | [`hdf5`] |
+//! | `.mat` | MATLAB's matrices (version 5, or 7.3, which is HDF5) | [`mat`] |
+//! | `.bvh` | motion capture: a skeleton's angles | [`bvh`] |
+//! | `.ts` | labelled series | [`series`] |
 //!
 //! A format is one file and one line in [`format::FORMATS`]. Each reader gets a [`format::Source`] with a
 //! [`budget::Budget`] and makes [`samples::Samples`]; from there [`samples::Samples::finish`] is the one way to a
@@ -22,6 +26,8 @@ use scrnn::dataset::{Dataset, Sequence};
 pub mod angles;
 pub mod arrays;
 pub mod budget;
+mod bvh;
+mod elsewhere;
 mod error;
 mod excerpt;
 mod files;
@@ -31,6 +37,7 @@ mod hdf5;
 mod joining;
 mod lerobot;
 mod literal;
+mod mat;
 mod mcap;
 mod npy;
 mod npz;
@@ -41,6 +48,7 @@ mod remark;
 mod replace;
 pub mod samples;
 mod selection;
+mod series;
 pub mod suspicions;
 mod table;
 pub mod times;

@@ -52,6 +52,14 @@ impl Packing {
     }
 }
 
+/// Unpacks a zlib stream of which nobody says how long it is, if that is at most `most` bytes.
+pub fn zlib_to_its_end(packed: &[u8], most: usize) -> Option<Vec<u8>> {
+    let mut out = Vec::new();
+    let mut stream = flate2::read::ZlibDecoder::new(packed).take(most as u64 + 1);
+    stream.read_to_end(&mut out).ok().filter(|_| out.len() <= most)?;
+    Some(out)
+}
+
 /// Unpacks a block of snappy: its length, then stretches of bytes and copies of what came before.
 fn snappy(packed: &[u8], size: usize) -> Option<Vec<u8>> {
     let mut packed = Front(packed);

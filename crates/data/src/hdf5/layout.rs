@@ -9,7 +9,7 @@ use super::{Contents, Found};
 use crate::problem::FormatProblem;
 use crate::reading::{Facts, Topic};
 use crate::samples::{Samples, Track};
-use crate::{Remark, Selection, natural};
+use crate::{Remark, Selection, natural, times};
 
 /// Beginnings of the names of groups of which each is a demonstration, also if there is only one.
 const DEMO: [&str; 9] = ["demo_", "demo", "episode_", "episode", "traj_", "trajectory_", "trial_", "rollout_", "run_"];
@@ -416,27 +416,12 @@ fn track(
     let mut times = Vec::new();
     if let Some(clock) = clock.filter(|clock| lengths(clock) == (steps, None)) {
         let numbers = contents.numbers(file, clock)?;
-        if let Some(read) = nanoseconds(&numbers, clock.about.kind.name().contains("int")) {
+        if let Some(read) = times::nanoseconds(&numbers) {
             times = read;
             samples.facts.clock = Some(clock.path.clone());
         }
     }
     Ok(Track { name: name.to_owned(), values, times })
-}
-
-/// Times in nanoseconds: fractions are of seconds, whole numbers tell their unit by their size since 1970.
-fn nanoseconds(numbers: &[f64], whole: bool) -> Option<Vec<i64>> {
-    let first = *numbers.first()?;
-    let unit = match first.abs() {
-        size if size > 1e17 => 1.0,
-        size if size > 1e14 => 1e3,
-        size if size > 1e11 => 1e6,
-        size if size > 1e8 || !whole => 1e9,
-        _ => return None,
-    };
-    let rises = numbers.windows(2).all(|pair| pair[1] > pair[0]);
-    (rises && numbers.iter().all(|number| number.is_finite()))
-        .then(|| numbers.iter().map(|number| (number * unit).round() as i64).collect())
 }
 
 /// Seconds between samples, where an attribute of the root or of `data` tells.
