@@ -42,9 +42,11 @@ fn parse(text: &str, budget: &Budget) -> Result<Samples, FormatProblem> {
     let mut lines = (1..).zip(text.lines().map(str::trim)).filter(lines).peekable();
     let (channels, units) = skeleton(&mut lines, budget)?;
     let mut told = |name: &str| -> Result<(usize, f64), FormatProblem> {
-        let (line, text) = lines.next().ok_or(FormatProblem::Damaged { kind: KIND, what: "it ends before its motion" })?;
+        let (line, text) =
+            lines.next().ok_or(FormatProblem::Damaged { kind: KIND, what: "it ends before its motion" })?;
         let number = text.strip_prefix(name).and_then(|rest| rest.trim_start().strip_prefix(':')).map(str::trim);
-        let number = number.and_then(|number| number.parse().ok()).filter(|number: &f64| number.is_finite() && *number >= 0.0);
+        let number =
+            number.and_then(|number| number.parse().ok()).filter(|number: &f64| number.is_finite() && *number >= 0.0);
         number.map(|number| (line, number)).ok_or_else(|| FormatProblem::Line {
             line,
             found: format!("`{}`", crate::excerpt::shortened(text)),
@@ -54,7 +56,11 @@ fn parse(text: &str, budget: &Budget) -> Result<Samples, FormatProblem> {
     let (_, promised) = told("Frames")?;
     let (line, period) = told("Frame Time")?;
     if period == 0.0 {
-        return Err(FormatProblem::Line { line, found: "no time passes between frames".to_owned(), needed: "the seconds between them".to_owned() });
+        return Err(FormatProblem::Line {
+            line,
+            found: "no time passes between frames".to_owned(),
+            needed: "the seconds between them".to_owned(),
+        });
     }
     budget.take(text.len().saturating_mul(8))?;
     let mut values: Vec<f64> = Vec::new();
@@ -95,7 +101,10 @@ fn parse(text: &str, budget: &Budget) -> Result<Samples, FormatProblem> {
 type Channels = (Vec<String>, Vec<Option<String>>);
 
 /// Reads the skeleton, up to the line MOTION.
-fn skeleton<'a>(lines: &mut impl Iterator<Item = (usize, &'a str)>, budget: &Budget) -> Result<Channels, FormatProblem> {
+fn skeleton<'a>(
+    lines: &mut impl Iterator<Item = (usize, &'a str)>,
+    budget: &Budget,
+) -> Result<Channels, FormatProblem> {
     let (mut channels, mut units) = (Vec::new(), Vec::new());
     let (mut joint, mut seen) = (String::new(), HashMap::<String, usize>::new());
     let mut words: Vec<(usize, &str)> = Vec::new();
@@ -108,7 +117,11 @@ fn skeleton<'a>(lines: &mut impl Iterator<Item = (usize, &'a str)>, budget: &Bud
         }
         budget.take(text.len() / 2 * size_of::<(usize, &str)>() + 32)?;
         // A name may hold spaces: it ends with the line or a brace.
-        if let Some(name) = ["ROOT", "JOINT"].iter().find_map(|word| text.strip_prefix(word)).filter(|rest| rest.starts_with([' ', '\t'])) {
+        if let Some(name) = ["ROOT", "JOINT"]
+            .iter()
+            .find_map(|word| text.strip_prefix(word))
+            .filter(|rest| rest.starts_with([' ', '\t']))
+        {
             let (name, rest) = name.split_once('{').unwrap_or((name, ""));
             joint = budget.text(name.trim())?;
             let count = seen.entry(joint.clone()).or_default();
@@ -131,8 +144,12 @@ fn skeleton<'a>(lines: &mut impl Iterator<Item = (usize, &'a str)>, budget: &Bud
                 found: "CHANNELS without as many names as it says".to_owned(),
                 needed: "a number and that many names".to_owned(),
             };
-            let count: usize = words.get(at + 1).and_then(|(_, count)| count.parse().ok()).ok_or_else(|| wrong(line))?;
-            let names = at.checked_add(2).and_then(|from| words.get(from..from.checked_add(count)?)).ok_or_else(|| wrong(line))?;
+            let count: usize =
+                words.get(at + 1).and_then(|(_, count)| count.parse().ok()).ok_or_else(|| wrong(line))?;
+            let names = at
+                .checked_add(2)
+                .and_then(|from| words.get(from..from.checked_add(count)?))
+                .ok_or_else(|| wrong(line))?;
             for (_, name) in names {
                 budget.take(joint.len() + name.len() + 64)?;
                 channels.push(format!("{joint}.{name}"));
@@ -185,7 +202,10 @@ Frame Time: 0.0333333
     #[test]
     fn channels_are_called_by_their_joints() {
         let reading = read(ARM).unwrap();
-        assert_eq!(reading.data.channels(), ["Hips.Xposition", "Hips.Zrotation", "Hips.Xrotation", "Hips.Yrotation", "Left Arm.Zrotation"]);
+        assert_eq!(
+            reading.data.channels(),
+            ["Hips.Xposition", "Hips.Zrotation", "Hips.Xrotation", "Hips.Yrotation", "Left Arm.Zrotation"]
+        );
         assert_eq!((reading.period, reading.data.sequences()[0].len()), (Some(0.033_333_3), 3));
         assert_eq!(reading.data.sequences()[0].sample(2), [-0.01, 0., 0., 0., 180.]);
         assert_eq!((&reading.facts.units[0], &reading.facts.units[4]), (&None, &Some("deg".to_owned())));

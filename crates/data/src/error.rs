@@ -181,6 +181,14 @@ pub enum FileError {
         path: String,
     },
 
+    /// A file that tells times is to be written, and nobody knows them.
+    #[error("{path} cannot be written: nothing tells how many seconds there are between two samples")]
+    #[diagnostic(help("say it: `--period 0.02` for 50 samples a second"))]
+    NoPeriod {
+        /// The file.
+        path: String,
+    },
+
     /// Files whose channels do not go together.
     #[error("the channels of {path} are {found}; those of {first} are {needed}")]
     #[diagnostic(help("{help}"))]
@@ -210,8 +218,10 @@ pub enum FileError {
     },
 
     /// A format that can be read only.
-    #[error("{path} cannot be written: samples alone make no recording")]
-    #[diagnostic(help("write a .npz file, or a .csv; `scrnn simulate` and `scrnn data` write recordings of robots"))]
+    #[error("{path} cannot be written: files of this kind are only read")]
+    #[diagnostic(help(
+        "write .csv, .txt, .npz, .npy, .parquet or .mcap, or a name without an extension: the folder of a LeRobot data set"
+    ))]
     OnlyRead {
         /// The file.
         path: String,

@@ -27,6 +27,7 @@ pub mod angles;
 pub mod arrays;
 pub mod budget;
 mod bvh;
+mod convert;
 mod elsewhere;
 mod error;
 mod excerpt;
@@ -54,6 +55,7 @@ mod table;
 pub mod times;
 mod unpack;
 
+pub use convert::{Conversion, convert, write_converted};
 pub use error::{ArrayProblem, FileError, LineError, LineProblem, RecordingProblem, disk_help};
 pub use files::{expand, natural};
 pub use joining::read_all;

@@ -37,8 +37,10 @@ pub fn read(source: &Source<'_>, selection: &Selection) -> Result<Samples, FileE
     let at = |problem: FormatProblem| problem.at(source.name());
     let contents = Contents::read(&bytes, source.budget()).map_err(at)?;
     if contents.arrays.is_empty() {
-        let there = contents.others.iter().map(|(name, what)| format!("{name} ({what})")).collect::<Vec<_>>().join(", ");
-        let found = if there.is_empty() { "it holds no variables".to_owned() } else { format!("it holds only {there}") };
+        let there =
+            contents.others.iter().map(|(name, what)| format!("{name} ({what})")).collect::<Vec<_>>().join(", ");
+        let found =
+            if there.is_empty() { "it holds no variables".to_owned() } else { format!("it holds only {there}") };
         let help = "in MATLAB, save matrices of steps x channels: `q = s.q; save('file.mat', 'q')`; in Python, \
                     `scipy.io.loadmat(FILE, simplify_cells=True)` gives a dictionary, whose arrays `numpy.savez` saves";
         return Err(at(FormatProblem::NotRead { found, help: help.to_owned() }));
@@ -292,7 +294,7 @@ mod tests {
     /// What tests/python/write_formats.py wrote with scipy.
     fn fixture(name: &str) -> Vec<u8> {
         let all = std::env::var_os("SCRNN_FIXTURES").map(PathBuf::from);
-        let folder = all.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures"));
+        let folder = all.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures"));
         std::fs::read(folder.join("mat").join(name)).unwrap()
     }
 

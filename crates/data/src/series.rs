@@ -40,7 +40,8 @@ struct Head {
 
 fn parse(text: &str) -> Result<Samples, FormatProblem> {
     let mut head = Head::default();
-    let mut lines = (1..).zip(text.lines().map(str::trim)).filter(|(_, line)| !line.is_empty() && !line.starts_with(['#', '%']));
+    let mut lines =
+        (1..).zip(text.lines().map(str::trim)).filter(|(_, line)| !line.is_empty() && !line.starts_with(['#', '%']));
     loop {
         let none = || FormatProblem::NotThis { kind: ".ts", why: "there is no line `@data` in it" };
         let (number, line) = lines.next().ok_or_else(none)?;
@@ -66,31 +67,46 @@ fn parse(text: &str) -> Result<Samples, FormatProblem> {
     let mut tracks: Vec<Track> = Vec::new();
     let mut labels: Vec<&str> = Vec::new();
     for (number, line) in lines {
-        let wrong = |found: String, needed: &str| FormatProblem::Line { line: number, found, needed: needed.to_owned() };
+        let wrong =
+            |found: String, needed: &str| FormatProblem::Line { line: number, found, needed: needed.to_owned() };
         let (data, label) = match line.rsplit_once(':').filter(|_| head.labelled) {
             Some((data, label)) => (data, label.trim()),
-            None if head.labelled => return Err(wrong("the line has no label".to_owned(), "`:` and a label at its end")),
+            None if head.labelled => {
+                return Err(wrong("the line has no label".to_owned(), "`:` and a label at its end"));
+            }
             None => (line, ""),
         };
         let dimensions: Vec<&str> = data.split(':').collect();
         let needed = *channels.get_or_insert(dimensions.len());
         if dimensions.len() != needed {
-            return Err(wrong(format!("the line has {} dimensions", dimensions.len()), &format!("{needed}, as the header or the first line has")));
+            return Err(wrong(
+                format!("the line has {} dimensions", dimensions.len()),
+                &format!("{needed}, as the header or the first line has"),
+            ));
         }
         let mut columns = Vec::with_capacity(needed);
         let mut times: Vec<f64> = Vec::new();
         for dimension in dimensions {
-            let (stamps, values) = if head.times { stamped(dimension) } else { plain(dimension).map(|values| (Vec::new(), values)) }
-                .map_err(|found| wrong(format!("`{}` is no value", crate::excerpt::shortened(found)), "numbers between commas"))?;
+            let (stamps, values) =
+                if head.times { stamped(dimension) } else { plain(dimension).map(|values| (Vec::new(), values)) }
+                    .map_err(|found| {
+                        wrong(format!("`{}` is no value", crate::excerpt::shortened(found)), "numbers between commas")
+                    })?;
             if !columns.is_empty() && stamps != times {
-                return Err(wrong("the dimensions have different times".to_owned(), "all dimensions at the same times"));
+                return Err(wrong(
+                    "the dimensions have different times".to_owned(),
+                    "all dimensions at the same times",
+                ));
             }
             times = stamps;
             columns.push(values);
         }
         let length = columns[0].len();
         if let Some(other) = columns.iter().find(|column| column.len() != length) {
-            return Err(wrong(format!("the dimensions have {length} and {} values", other.len()), "dimensions of one length"));
+            return Err(wrong(
+                format!("the dimensions have {length} and {} values", other.len()),
+                "dimensions of one length",
+            ));
         }
         let values = (0..length).flat_map(|t| columns.iter().map(move |column| column[t])).collect();
         let count = tracks.len() + 1;
@@ -105,7 +121,10 @@ fn parse(text: &str) -> Result<Samples, FormatProblem> {
     samples.tracks = tracks;
     if !labels.is_empty() {
         labels.sort_by(|a, b| crate::natural(a, b));
-        let what = format!("the {count} series have labels ({}), which stand in their names and are not learned", labels.join(", "));
+        let what = format!(
+            "the {count} series have labels ({}), which stand in their names and are not learned",
+            labels.join(", ")
+        );
         samples.remarks.push(Remark::Understood { what });
     }
     Ok(samples)
@@ -129,7 +148,11 @@ fn stamped(dimension: &str) -> Result<(Vec<f64>, Vec<f64>), &str> {
         Some((time.trim().parse().ok().filter(|time: &f64| time.is_finite())?, value(number).ok()?))
     };
     let inside = dimension.trim().strip_prefix('(').and_then(|rest| rest.strip_suffix(')')).ok_or(dimension)?;
-    inside.split("),(").map(|text| pair(text).ok_or(text)).collect::<Result<Vec<_>, _>>().map(|pairs| pairs.into_iter().unzip())
+    inside
+        .split("),(")
+        .map(|text| pair(text).ok_or(text))
+        .collect::<Result<Vec<_>, _>>()
+        .map(|pairs| pairs.into_iter().unzip())
 }
 
 /// Times of series are counts or seconds.

@@ -7,7 +7,7 @@ use crate::{Axes, Reading, inspect_bytes};
 /// What tests/python/write_formats.py wrote with h5py. `SCRNN_FIXTURES` can name a folder with all that it writes.
 fn fixture(name: &str) -> Vec<u8> {
     let all = std::env::var_os("SCRNN_FIXTURES").map(PathBuf::from);
-    let folder = all.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures"));
+    let folder = all.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures"));
     std::fs::read(folder.join("hdf5").join(name)).unwrap()
 }
 
@@ -218,4 +218,18 @@ fn damaged_bytes_never_panic() {
             read_all(&bytes[..bytes.len() * part / 100]);
         }
     }
+}
+
+#[test]
+fn demo_2_comes_before_demo_10() {
+    let case = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases/28-robomimic-hdf5/demo.hdf5");
+    let reading = crate::inspect(&case, &Selection::default()).unwrap();
+    let names: Vec<String> = reading.data.sequences().iter().map(|one| one.name.clone()).collect();
+    assert_eq!(names, (0..12).map(|demo| format!("demo_{demo}")).collect::<Vec<_>>());
+    assert!(reading.data.sequences().iter().all(|one| one.len() == 40));
+    assert_eq!((reading.data.channels().len(), reading.data.channels()[7].as_str()), (9, "actions.0"));
+    // Of demo_10, as h5py reads it.
+    let sample = reading.data.sequences()[10].sample(3);
+    assert_eq!(sample[..2], [-0.446_506_249_861_436_94, -0.085_805_176_156_179_69]);
+    assert_eq!(sample[7..], [-0.426_946_282_847_032_23, -0.069_619_550_337_053_6]);
 }

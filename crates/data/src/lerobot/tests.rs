@@ -4,7 +4,7 @@ use crate::{FileError, Reading, Selection, inspect};
 
 fn fixtures() -> PathBuf {
     let all = std::env::var_os("SCRNN_FIXTURES").map(PathBuf::from);
-    all.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures"))
+    all.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures"))
 }
 
 fn read(name: &str) -> Reading {
@@ -106,4 +106,17 @@ fn what_does_not_fit_is_said() {
     assert!(error.contains("info.json") && error.contains("line 1"), "{error}");
     let empty = data_set("{\"fps\": 50}", &[]);
     assert!(matches!(inspect(empty.path(), &Selection::default()), Err(FileError::Empty { .. })));
+}
+
+#[test]
+fn a_table_of_frames_is_the_same_as_parquet_and_as_text() {
+    let case = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases/05-lerobot-table");
+    let columns = inspect(&case.join("lerobot_v3"), &Selection::default()).unwrap();
+    assert_eq!(columns.data.sequences().len(), 4);
+    assert_eq!(columns.data.channels(), STATE);
+    assert!((columns.period.unwrap() - 1.0 / 30.0).abs() < 1e-12);
+    let first = columns.data.sequences()[0].sample(1);
+    assert_eq!(first, [0.100_264_905_528_571_34, 0.530_202_785_000_047_4, 0.0]);
+    let text = inspect(&case.join("episodes.csv"), &Selection::default()).unwrap();
+    assert_eq!(text.data, columns.data);
 }

@@ -17,6 +17,7 @@ mod chunk;
 mod encoding;
 mod schema;
 mod thrift;
+pub mod write;
 
 pub use encoding::half;
 pub use schema::Leaf;

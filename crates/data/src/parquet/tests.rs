@@ -5,7 +5,7 @@ use super::*;
 /// What tests/python/write_formats.py wrote with pyarrow. `SCRNN_FIXTURES` can name a folder with all that it writes.
 pub fn fixture(name: &str) -> Vec<u8> {
     let folder = std::env::var_os("SCRNN_FIXTURES").map(PathBuf::from);
-    let folder = folder.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures"));
+    let folder = folder.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures"));
     std::fs::read(folder.join(name)).unwrap()
 }
 
