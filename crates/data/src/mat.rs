@@ -85,7 +85,7 @@ impl Contents {
         let big_endian = match &head[126..] {
             b"IM" => false,
             b"MI" => true,
-            _ if bytes[..4].iter().any(|&byte| byte == 0) => {
+            _ if bytes[..4].contains(&0) => {
                 let help = "in MATLAB: `load` it, then `save('file.mat', 'name', '-v7')`".to_owned();
                 return Err(FormatProblem::NotRead { found: "it may be a MATLAB file of version 4".to_owned(), help });
             }

@@ -217,9 +217,9 @@ fn place(
     let mut at = vec![0; rank - 1];
     for _ in 0..rows {
         let (mut from, mut to) = (0, 0);
-        for axis in 0..rank - 1 {
-            from = (from + at[axis]) * grid.chunk[axis + 1];
-            to = (to + chunk.origin[axis] + at[axis]) * grid.shape[axis + 1];
+        for (axis, place) in at.iter().enumerate() {
+            from = (from + place) * grid.chunk[axis + 1];
+            to = (to + chunk.origin[axis] + place) * grid.shape[axis + 1];
         }
         to += chunk.origin[rank - 1];
         let row = &data[from * kind.size..(from + last) * kind.size];
