@@ -128,3 +128,34 @@ pub fn urdf(bytes: &[u8]) {
         Err(error) => assert!(!error.to_string().is_empty()),
     });
 }
+
+/// A reader that draws all it holds on a budget: 16 MiB and 2100 bytes for each byte of the file. What is counted twice for
+/// a moment, as a vector grows, is allowed for.
+fn budgeted(name: &str, bytes: &[u8]) {
+    bounded_beyond(FREE_UNPACKING + (16 << 20), bytes, 4400, || readers::data(name, bytes, false));
+}
+
+/// A table in columns.
+pub fn parquet(bytes: &[u8]) {
+    budgeted("x.parquet", bytes);
+}
+
+/// Data sets in groups.
+pub fn hdf5(bytes: &[u8]) {
+    budgeted("x.hdf5", bytes);
+}
+
+/// MATLAB's matrices.
+pub fn mat(bytes: &[u8]) {
+    budgeted("x.mat", bytes);
+}
+
+/// Motion capture.
+pub fn bvh(bytes: &[u8]) {
+    budgeted("x.bvh", bytes);
+}
+
+/// Labelled series.
+pub fn series(bytes: &[u8]) {
+    budgeted("x.ts", bytes);
+}

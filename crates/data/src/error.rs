@@ -6,6 +6,7 @@ use std::path::Path;
 use miette::{Diagnostic, NamedSource, SourceSpan};
 
 use crate::budget::OverBudget;
+use crate::problem::FormatProblem;
 use crate::recording::RecordingProblem;
 
 /// A data file that cannot be read or written.
@@ -181,6 +182,14 @@ pub enum FileError {
         path: String,
     },
 
+    /// A file that tells times is to be written, and nobody knows them.
+    #[error("{path} cannot be written: nothing tells how many seconds there are between two samples")]
+    #[diagnostic(help("say it: `--period 0.02` for 50 samples a second"))]
+    NoPeriod {
+        /// The file.
+        path: String,
+    },
+
     /// Files whose channels do not go together.
     #[error("the channels of {path} are {found}; those of {first} are {needed}")]
     #[diagnostic(help("{help}"))]
@@ -210,8 +219,10 @@ pub enum FileError {
     },
 
     /// A format that can be read only.
-    #[error("{path} cannot be written: samples alone make no recording")]
-    #[diagnostic(help("write a .npz file, or a .csv; `scrnn simulate` and `scrnn data` write recordings of robots"))]
+    #[error("{path} cannot be written: files of this kind are only read")]
+    #[diagnostic(help(
+        "write .csv, .txt, .npz, .npy, .parquet or .mcap, or a name without an extension: the folder of a LeRobot data set"
+    ))]
     OnlyRead {
         /// The file.
         path: String,
@@ -248,6 +259,30 @@ pub enum FileError {
         shortest: usize,
         /// Most samples.
         longest: usize,
+    },
+
+    /// A file of a format that is known, but not read.
+    #[error("{path} is {what}, which is not read here")]
+    #[diagnostic(help("{help}"))]
+    Elsewhere {
+        /// The file.
+        path: String,
+        /// What it is.
+        what: &'static str,
+        /// What turns it into one that is read.
+        help: String,
+    },
+
+    /// A file of a format that others made.
+    #[error("{path}: {problem}")]
+    Format {
+        /// The file.
+        path: String,
+        /// What is wrong.
+        problem: Box<FormatProblem>,
+        /// What to do.
+        #[help]
+        help: Option<String>,
     },
 
     /// Values that make no data set.

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::budget::Budget;
 use crate::samples::Samples;
-use crate::{Field, FileError, Selection, npy, npz, recording, table};
+use crate::{Field, FileError, Selection, bvh, hdf5, lerobot, mat, npy, npz, recording, series, table};
 
 /// One format.
 pub struct Format {
@@ -94,6 +94,46 @@ pub const FORMATS: &[Format] = &[
         read: recording::refuse_ros1,
         write: None,
     },
+    Format {
+        name: "LeRobot data set or parquet table",
+        extensions: &["parquet"],
+        folder: Some(lerobot::is_folder),
+        options: &["arrays", "period"],
+        read: lerobot::read,
+        write: None,
+    },
+    Format {
+        name: "HDF5 file",
+        extensions: &["hdf5", "h5", "he5"],
+        folder: None,
+        options: &["arrays", "axes", "period"],
+        read: hdf5::read,
+        write: None,
+    },
+    Format {
+        name: "MATLAB file",
+        extensions: &["mat"],
+        folder: None,
+        options: &["arrays", "axes", "period"],
+        read: mat::read,
+        write: None,
+    },
+    Format {
+        name: "motion capture (BVH)",
+        extensions: &["bvh"],
+        folder: None,
+        options: &["period"],
+        read: bvh::read,
+        write: None,
+    },
+    Format {
+        name: "labelled series (.ts)",
+        extensions: &["ts"],
+        folder: None,
+        options: &["period"],
+        read: series::read,
+        write: None,
+    },
 ];
 
 impl Format {
@@ -110,7 +150,10 @@ impl Format {
         let known = extension
             .filter(|_| !is_folder)
             .and_then(|extension| FORMATS.iter().find(|format| format.extensions.contains(&extension.as_str())));
-        known.ok_or_else(|| FileError::Extension { path: path.display().to_string(), known: known_extensions() })
+        known.ok_or_else(|| {
+            crate::elsewhere::refusal(path)
+                .unwrap_or_else(|| FileError::Extension { path: path.display().to_string(), known: known_extensions() })
+        })
     }
 
     /// Whether the name of a file tells that it holds data.

@@ -6,6 +6,11 @@
 //! | `.npy` | one numpy array: sequences x steps x channels, steps x channels, or steps | [`npy`] |
 //! | `.npz` | numpy arrays: sequences, or groups of channels | [`npz`] |
 //! | `.mcap`, `.db3`, folders of bags | a recording; messages are samples. Only read | [`recording`] |
+//! | `.parquet`, folders of LeRobot | a data set of demonstrations, or a table in columns | [`lerobot`] |
+//! | `.hdf5`, `.h5` | demonstrations, or any data sets | [`hdf5`] |
+//! | `.mat` | MATLAB's matrices (version 5, or 7.3, which is HDF5) | [`mat`] |
+//! | `.bvh` | motion capture: a skeleton's angles | [`bvh`] |
+//! | `.ts` | labelled series | [`series`] |
 //!
 //! A format is one file and one line in [`format::FORMATS`]. Each reader gets a [`format::Source`] with a
 //! [`budget::Budget`] and makes [`samples::Samples`]; from there [`samples::Samples::finish`] is the one way to a
@@ -21,27 +26,40 @@ use scrnn::dataset::{Dataset, Sequence};
 pub mod angles;
 pub mod arrays;
 pub mod budget;
+mod bvh;
+mod convert;
+mod elsewhere;
 mod error;
 mod excerpt;
 mod files;
 pub mod format;
+mod front;
+mod hdf5;
 mod joining;
+mod lerobot;
 mod literal;
+mod mat;
 mod npy;
 mod npz;
+mod parquet;
+mod problem;
 mod reading;
 mod recording;
 mod remark;
 mod replace;
 pub mod samples;
 mod selection;
+mod series;
 pub mod suspicions;
 mod table;
 pub mod times;
+mod unpack;
 
+pub use convert::{Conversion, convert, write_converted};
 pub use error::{ArrayProblem, FileError, LineError, LineProblem, disk_help};
 pub use files::{expand, natural};
 pub use joining::read_all;
+pub use problem::FormatProblem;
 pub use reading::{Facts, Gap, Reading, Topic};
 pub use recording::RecordingProblem;
 pub use remark::{Level, Remark};
@@ -104,8 +122,12 @@ pub fn inspect_bytes(path: &Path, bytes: &[u8], selection: &Selection) -> Result
 fn read_source(format: &Format, source: &Source<'_>, selection: &Selection) -> Result<Reading, FileError> {
     format.check(source.name(), selection)?;
     let mut samples = (format.read)(source, selection)?;
-    samples.facts.format = format.name.to_owned();
-    samples.facts.files = vec![source.name().to_owned()];
+    if samples.facts.format.is_empty() {
+        samples.facts.format = format.name.to_owned();
+    }
+    if samples.facts.files.is_empty() {
+        samples.facts.files = vec![source.name().to_owned()];
+    }
     samples.finish(source.name(), selection)
 }
 
@@ -137,3 +159,5 @@ pub fn csv(fields: &[Field<'_>]) -> String {
 mod memory_tests;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_random;
