@@ -39,7 +39,7 @@ pub mod suspicions;
 mod table;
 pub mod times;
 
-pub use error::{ArrayProblem, FileError, LineError, LineProblem, RecordingProblem, disk_help};
+pub use error::{ArrayProblem, ChannelsError, FileError, LineError, LineProblem, RecordingProblem, disk_help};
 pub use files::{expand, natural};
 pub use joining::read_all;
 pub use reading::{Facts, Gap, Reading, Topic};
