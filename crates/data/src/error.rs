@@ -191,20 +191,9 @@ pub enum FileError {
     },
 
     /// Files whose channels do not go together.
-    #[error("the channels of {path} are {found}; those of {first} are {needed}")]
-    #[diagnostic(help("{help}"))]
-    ChannelsDiffer {
-        /// The file that differs.
-        path: String,
-        /// Its channels.
-        found: String,
-        /// The first file.
-        first: String,
-        /// The channels of that.
-        needed: String,
-        /// What to do.
-        help: String,
-    },
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    ChannelsDiffer(Box<ChannelsError>),
 
     /// A channel that is asked for, but not there.
     #[error("{path} has no channel `{found}`")]
@@ -316,6 +305,23 @@ pub fn disk_help(kind: io::ErrorKind) -> Option<&'static str> {
         io::ErrorKind::NotADirectory => Some("part of the path is a file, not a folder"),
         _ => None,
     }
+}
+
+/// Files whose channels do not go together.
+#[derive(Debug, thiserror::Error, Diagnostic)]
+#[error("the channels of {path} are {found}; those of {first} are {needed}")]
+pub struct ChannelsError {
+    /// The file that differs.
+    pub path: String,
+    /// Its channels.
+    pub found: String,
+    /// The first file.
+    pub first: String,
+    /// The channels of that.
+    pub needed: String,
+    /// What to do.
+    #[help]
+    pub help: String,
 }
 
 /// A line of a text file that cannot be read, with the text around it.

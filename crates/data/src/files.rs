@@ -118,12 +118,19 @@ fn fits(pattern: &str, name: &str) -> bool {
                 (p, n) = (p + 1, n + 1);
                 continue;
             }
-            Some('[') if let Some((fits, after)) = one_of(&pattern[p + 1..], name[n]) => {
-                if fits {
+            Some('[') => match one_of(&pattern[p + 1..], name[n]) {
+                Some((true, after)) => {
                     (p, n) = (p + 1 + after, n + 1);
                     continue;
                 }
-            }
+                Some((false, _)) => {}
+                // A bracket that nothing closes stands for itself.
+                None if name[n] == '[' => {
+                    (p, n) = (p + 1, n + 1);
+                    continue;
+                }
+                None => {}
+            },
             Some(c) if *c == name[n] => {
                 (p, n) = (p + 1, n + 1);
                 continue;

@@ -6,7 +6,7 @@ use std::path::Path;
 use scrnn::dataset::{Dataset, Sequence};
 
 use crate::remark::Remark;
-use crate::{FileError, Reading, Selection, expand, inspect};
+use crate::{ChannelsError, FileError, Reading, Selection, expand, inspect};
 
 /// Reads all files that the patterns name ([`expand`]) as one data set. The first file's channels are needed in all
 /// others, in any order. Sequences of several files are called `file/sequence`.
@@ -93,12 +93,14 @@ fn columns(
     if found == channels {
         return Ok(None);
     }
-    let differ = |help: String| FileError::ChannelsDiffer {
-        path: path.display().to_string(),
-        found: found.join(", "),
-        first: first.display().to_string(),
-        needed: channels.join(", "),
-        help,
+    let differ = |help: String| {
+        FileError::ChannelsDiffer(Box::new(ChannelsError {
+            path: path.display().to_string(),
+            found: found.join(", "),
+            first: first.display().to_string(),
+            needed: channels.join(", "),
+            help,
+        }))
     };
     if found.len() != channels.len() {
         return Err(differ(

@@ -56,7 +56,7 @@ pub mod times;
 mod unpack;
 
 pub use convert::{Conversion, convert, write_converted};
-pub use error::{ArrayProblem, FileError, LineError, LineProblem, disk_help};
+pub use error::{ArrayProblem, ChannelsError, FileError, LineError, LineProblem, disk_help};
 pub use files::{expand, natural};
 pub use joining::read_all;
 pub use problem::FormatProblem;

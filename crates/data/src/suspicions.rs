@@ -475,17 +475,7 @@ mod tests {
     }
 
     #[test]
-    fn plain_movements_and_the_thesis_data_raise_nothing() {
-        use scrnn::tasks::{limit_cycle, lissajous, patterns, sinusoid};
-        let tasks = [
-            lissajous::generate(&lissajous::Options::default(), 1).unwrap().data,
-            patterns::generate(&patterns::Options::default(), 1).unwrap().data,
-            sinusoid::generate(&sinusoid::Options::default(), 1).unwrap().data,
-            limit_cycle::generate(&limit_cycle::Options::default(), 1).unwrap().task.data,
-        ];
-        for data in tasks {
-            assert_eq!(look(&data), [], "{:?}", data.channels());
-        }
+    fn plain_movements_raise_nothing() {
         assert_eq!(look(&set(&[sine(200)])), []);
         assert_eq!(look(&set(&[noise(1000)])), []);
         // A gripper that opens and closes, and a touch that lasts.
@@ -545,7 +535,10 @@ mod tests {
     fn jumps_of_a_whole_turn_are_seen() {
         let angle: Vec<f64> = (0..200).map(|k| 0.1 * f64::from(k) + 0.02 * (f64::from(k) * 0.3).sin()).collect();
         let wrapped: Vec<f64> = angle.iter().map(|x| (x + PI).rem_euclid(TAU) - PI).collect();
-        assert!(matches!(&look(&set(&[wrapped.clone()]))[..], [Suspicion::Turns { step: 33, count: 3, .. }]));
+        assert!(matches!(
+            &look(&set(std::slice::from_ref(&wrapped)))[..],
+            [Suspicion::Turns { step: 33, count: 3, .. }]
+        ));
         let degrees: Vec<f64> = wrapped.iter().map(|x| x.to_degrees()).collect();
         assert!(matches!(&look(&set(&[degrees]))[..], [Suspicion::Turns { count: 3, .. }]));
         // A square wave of the same size stays where it is for a while, and so does one that never comes near the ends.

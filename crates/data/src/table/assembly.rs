@@ -155,7 +155,7 @@ fn label(
     plans: &[Plan],
     rows: &Rows,
     is: &mut [Is],
-    track: &mut Vec<u32>,
+    track: &mut [u32],
     names: &mut Vec<String>,
     remarks: &mut Vec<Remark>,
 ) -> bool {

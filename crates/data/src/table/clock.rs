@@ -149,24 +149,14 @@ fn candidates(layout: &Layout, plans: &[Plan], rows: &Rows) -> Vec<Candidate> {
             continue;
         }
         // Seconds and nanoseconds in two columns.
-        if let Some(Role::Seconds(stem)) = &plan.role {
-            if let Some(other) = nanoseconds
-                .get(stem.as_str())
-                .copied()
-                .filter(|&other| rows.columns[other].times.len() == kept.times.len())
-            {
-                let times = added(&kept.times, &rows.columns[other].times, BILLION);
-                let stamp = stem.contains("stamp");
-                candidates.push(Candidate {
-                    columns: vec![index, other],
-                    times,
-                    decimals: 0,
-                    unit: Some(1),
-                    sure: true,
-                    stamp,
-                });
-                (used[index], used[other]) = (true, true);
-            }
+        if let Some(Role::Seconds(stem)) = &plan.role
+            && let Some(&other) = nanoseconds.get(stem.as_str())
+            && rows.columns[other].times.len() == kept.times.len()
+        {
+            let times = added(&kept.times, &rows.columns[other].times, BILLION);
+            let (columns, stamp) = (vec![index, other], stem.contains("stamp"));
+            candidates.push(Candidate { columns, times, decimals: 0, unit: Some(1), sure: true, stamp });
+            (used[index], used[other]) = (true, true);
         }
         // A day and a time of day.
         if let (Some(Shape::Day), Some(Shape::Clock)) =
