@@ -5,7 +5,7 @@
 set -eu
 scrnn=$(realpath "${1:-target/release/scrnn}")
 cd "$(dirname "$0")"
-for target in table npy npz mcap experiment checkpoint urdf; do mkdir -p "corpus/$target"; done
+for target in table npy npz mcap sqlite cdr protobuf bag experiment checkpoint urdf parquet hdf5 mat bvh series; do mkdir -p "corpus/$target"; done
 for kind in csv tsv txt; do "$scrnn" data lissajous --sequences 2 --steps 4 --out "corpus/table/x.$kind" -q; done
 rm -f corpus/*/*.truth.*
 printf 'sequence;step;y 1;"y ""2"""\na;1;0,5;2\na;2;1;3\n\nb;1;nan;-1e9\n' > corpus/table/semicolons
@@ -17,5 +17,19 @@ cp ../assets/experiments/*.toml corpus/experiment/
 cp ../tests/golden/run/*.safetensors corpus/checkpoint/
 cp ../tests/golden/run/experiment.toml corpus/experiment/
 cp corpora/*.mcap corpus/mcap/
+cases=../crates/data/tests/cases
+cp "$cases"/1*/*.mcap "$cases"/14-cdr-jointstate/bag/bag.mcap corpus/mcap/
+cp "$cases"/14-cdr-jointstate/bag3/bag3.db3 corpus/sqlite/
+printf 'float64 x\nOther[] y\nstring[<=2] z\n===\nMSG: pkg/Other\nuint8[3] a\nbool b\n\0\0\1\0\0\1\0\0\0\0\0\0\0\1\0\0\0\1\2\3\1' > corpus/cdr/msg
+printf 'module pkg { module msg { struct Thing { double x; sequence<long, 3> y; string<4> z[2]; }; }; };\0\0\1\0\0\1\0\0\0\0\0\0\0' > corpus/cdr/idl
+printf '\012\037\022\001a\042\022\012\005Thing\022\011\012\001x\030\001\040\001\050\001\142\006proto3\377\011\0\0\0\0\0\0\360\077' > corpus/protobuf/thing
+{ printf '  relative_file_paths:\n  - a.mcap\n\0'; cat corpora/plain.mcap; } > corpus/bag/plain
 [ ! -e ../assets/nao/nao.urdf ] || cp ../assets/nao/nao.urdf corpus/urdf/
 printf '<robot name="a"><link name="b"/><link name="c"/><joint name="d" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>' > corpus/urdf/small
+fixtures=../crates/data/tests/fixtures
+cp "$fixtures"/parquet/*.parquet corpus/parquet/
+cp "$fixtures"/hdf5/*.h5 "$fixtures"/hdf5/*.hdf5 corpus/hdf5/
+cp "$fixtures"/mat/*.mat "$fixtures"/hdf5/matlab.mat corpus/mat/
+printf 'HIERARCHY\nROOT a b\n{\nOFFSET 0 0 0\nCHANNELS 2 Xposition Zrotation\nEnd Site\n{\n}\n}\nMOTION\nFrames: 2\nFrame Time: 0.02\n1 2\n3 -4e1\n' > corpus/bvh/small
+printf '@dimensions 2\n@timeStamps false\n@classLabel true a b\n@data\n1,2:3,?:a\n5:6:b\n' > corpus/series/plain
+printf '@timeStamps true\n@classLabel false\n@data\n(0,1),(0.5,2)\n' > corpus/series/times

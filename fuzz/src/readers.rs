@@ -4,16 +4,26 @@
 
 use std::path::Path;
 
+use scrnn::dataset::Dataset;
+use scrnn_data::{FileError, Selection, parse_as, read_part};
 use scrnn_run::experiment::{self, Override};
-use scrnn_data::{Selection, parse_as};
 
 /// A data file of this name. With `resampled`, a recording's joints every twentieth of a second.
 pub fn data(name: &str, bytes: &[u8], resampled: bool) {
     let selection = match resampled {
-        true => Selection { topic: Some("/joint_states".to_owned()), period: Some(0.05), channels: None },
+        true => Selection { topics: vec!["/joint_states".to_owned()], period: Some(0.05), ..Selection::default() },
         false => Selection::default(),
     };
-    match parse_as(Path::new(name), bytes, &selection) {
+    judge(bytes, parse_as(Path::new(name), bytes, &selection));
+}
+
+/// A folder that may be one recording.
+pub fn folder(path: &Path) {
+    judge(&[], read_part(path, &Selection::default()));
+}
+
+fn judge(bytes: &[u8], outcome: Result<Dataset, FileError>) {
+    match outcome {
         Ok(data) => {
             assert!(data.total_samples() > 0 && !data.channels().is_empty());
             assert!(data.sequences().iter().all(|s| s.values().iter().all(|value| value.is_finite())));

@@ -74,12 +74,17 @@ fn period(text: &str) -> std::result::Result<f64, String> {
 impl Part {
     /// What it selects in the file at `path`; where it is silent, what `learned` of its training's data says.
     pub fn of(&self, path: &Path, learned: Option<Selection>) -> Selection {
-        let Selection { topic, period, channels } = learned.unwrap_or_default();
+        let Selection { topics, period, channels, .. } = learned.unwrap_or_default();
         let recording = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"));
         Selection {
-            topic: self.topic.clone().or(topic.filter(|_| recording)),
+            topics: match &self.topic {
+                Some(topic) => vec![topic.clone()],
+                None if recording => topics,
+                None => Vec::new(),
+            },
             period: self.period.or(period.filter(|_| recording)),
             channels: self.channels.clone().or(channels),
+            ..Selection::default()
         }
     }
 }

@@ -5,6 +5,10 @@ use std::path::Path;
 
 use miette::{Diagnostic, NamedSource, SourceSpan};
 
+use crate::budget::OverBudget;
+use crate::problem::FormatProblem;
+use crate::recording::RecordingProblem;
+
 /// A data file that cannot be read or written.
 #[derive(Debug, thiserror::Error, Diagnostic)]
 pub enum FileError {
@@ -25,10 +29,22 @@ pub enum FileError {
 
     /// The extension does not tell a format.
     #[error("the name of {path} does not tell what the file holds")]
-    #[diagnostic(help("data files end in .csv, .txt, .dat, .tsv, .npy, .npz or .mcap"))]
+    #[diagnostic(help("data files end in {known}"))]
     Extension {
         /// The file.
         path: String,
+        /// The extensions that are known.
+        known: String,
+    },
+
+    /// A pattern or a folder without data files.
+    #[error("{what}: {pattern}")]
+    #[diagnostic(help("check the spelling; paths start from the folder of the experiment file, or the current one"))]
+    NoMatch {
+        /// The pattern.
+        pattern: String,
+        /// What is missing.
+        what: &'static str,
     },
 
     /// A file that was to hold text.
@@ -72,7 +88,7 @@ pub enum FileError {
         problem: ArrayProblem,
         /// What to do.
         #[help]
-        help: Option<&'static str>,
+        help: Option<String>,
     },
 
     /// An array with a value that is NaN or infinite.
@@ -101,6 +117,13 @@ pub enum FileError {
         source: zip::result::ZipError,
     },
 
+    /// An archive whose members share bytes, so that it would unpack to far more than it has.
+    #[error("{path} is a damaged archive: its members overlap")]
+    Overlap {
+        /// The file.
+        path: String,
+    },
+
     /// A recording that cannot be read.
     #[error("{path}: {problem}")]
     Recording {
@@ -113,15 +136,64 @@ pub enum FileError {
         help: Option<String>,
     },
 
-    /// An option that makes sense for recordings only.
-    #[error("{path} is no recording; `{option}` goes with .mcap files only")]
+    /// An option that makes sense for other formats only.
+    #[error("{path} is read as {format}; `{option}` goes with {known} only")]
     #[diagnostic(help("leave it out"))]
-    NotARecording {
+    UnknownOption {
         /// The file.
         path: String,
+        /// What kind of file it is.
+        format: &'static str,
         /// The option.
         option: &'static str,
+        /// Extensions of the formats that know it.
+        known: String,
     },
+
+    /// A file that would fill the memory.
+    #[error("{path}: {problem}")]
+    #[diagnostic(help("it may be damaged; if it is not, unpack it or cut it into several files"))]
+    OverBudget {
+        /// The file.
+        path: String,
+        /// How much it would take.
+        problem: OverBudget,
+    },
+
+    /// Times that are not even, or cannot be made so.
+    #[error("{path}, sequence {sequence}: {found}; steps are equally spaced")]
+    #[diagnostic(help("{help}"))]
+    Times {
+        /// The file.
+        path: String,
+        /// The sequence.
+        sequence: String,
+        /// What was found.
+        found: String,
+        /// What to do.
+        help: String,
+    },
+
+    /// A period for data of which nobody knows when they were taken.
+    #[error("{path} does not tell when its samples were taken, so they cannot be brought to a period")]
+    #[diagnostic(help("leave `period` out, or add a column `time` in seconds"))]
+    NoClock {
+        /// The file.
+        path: String,
+    },
+
+    /// A file that tells times is to be written, and nobody knows them.
+    #[error("{path} cannot be written: nothing tells how many seconds there are between two samples")]
+    #[diagnostic(help("say it: `--period 0.02` for 50 samples a second"))]
+    NoPeriod {
+        /// The file.
+        path: String,
+    },
+
+    /// Files whose channels do not go together.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    ChannelsDiffer(Box<ChannelsError>),
 
     /// A channel that is asked for, but not there.
     #[error("{path} has no channel `{found}`")]
@@ -136,8 +208,10 @@ pub enum FileError {
     },
 
     /// A format that can be read only.
-    #[error("{path} cannot be written: samples alone make no recording")]
-    #[diagnostic(help("write a .npz file, or a .csv; `scrnn simulate` and `scrnn data` write recordings of robots"))]
+    #[error("{path} cannot be written: files of this kind are only read")]
+    #[diagnostic(help(
+        "write .csv, .txt, .npz, .npy, .parquet or .mcap, or a name without an extension: the folder of a LeRobot data set"
+    ))]
     OnlyRead {
         /// The file.
         path: String,
@@ -176,6 +250,30 @@ pub enum FileError {
         longest: usize,
     },
 
+    /// A file of a format that is known, but not read.
+    #[error("{path} is {what}, which is not read here")]
+    #[diagnostic(help("{help}"))]
+    Elsewhere {
+        /// The file.
+        path: String,
+        /// What it is.
+        what: &'static str,
+        /// What turns it into one that is read.
+        help: String,
+    },
+
+    /// A file of a format that others made.
+    #[error("{path}: {problem}")]
+    Format {
+        /// The file.
+        path: String,
+        /// What is wrong.
+        problem: Box<FormatProblem>,
+        /// What to do.
+        #[help]
+        help: Option<String>,
+    },
+
     /// Values that make no data set.
     #[error("{path}")]
     Data {
@@ -207,6 +305,23 @@ pub fn disk_help(kind: io::ErrorKind) -> Option<&'static str> {
         io::ErrorKind::NotADirectory => Some("part of the path is a file, not a folder"),
         _ => None,
     }
+}
+
+/// Files whose channels do not go together.
+#[derive(Debug, thiserror::Error, Diagnostic)]
+#[error("the channels of {path} are {found}; those of {first} are {needed}")]
+pub struct ChannelsError {
+    /// The file that differs.
+    pub path: String,
+    /// Its channels.
+    pub found: String,
+    /// The first file.
+    pub first: String,
+    /// The channels of that.
+    pub needed: String,
+    /// What to do.
+    #[help]
+    pub help: String,
 }
 
 /// A line of a text file that cannot be read, with the text around it.
@@ -244,6 +359,13 @@ pub enum LineProblem {
         first: usize,
     },
 
+    /// What could mean several things.
+    #[error("{what}")]
+    Ambiguous {
+        /// What it could be, and what to do.
+        what: &'static str,
+    },
+
     /// Something else than a number.
     #[error("`{found}` in column {column} is not a number")]
     NotANumber {
@@ -272,129 +394,11 @@ impl LineProblem {
     fn label(&self) -> String {
         match self {
             Self::FieldCount { found, needed, .. } => format!("{found} instead of {needed} fields"),
+            Self::Ambiguous { .. } => "this line".to_owned(),
             Self::NotANumber { .. } => "not a number".to_owned(),
             Self::NotFinite { .. } => "not a finite number".to_owned(),
         }
     }
-}
-
-/// What is wrong with a recording.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum RecordingProblem {
-    /// Other contents.
-    #[error("this is not an MCAP file")]
-    NotMcap,
-
-    /// A format that did not exist when this was written.
-    #[error("version {found} of MCAP; known: 0")]
-    Version {
-        /// The version, a character.
-        found: String,
-    },
-
-    /// No end.
-    #[error("the recording is cut off")]
-    CutOff,
-
-    /// Contents that contradict themselves.
-    #[error("the recording is damaged: {0}")]
-    Damaged(&'static str),
-
-    /// A chunk that cannot be unpacked.
-    #[error("a chunk cannot be unpacked ({compression}): {message}")]
-    Compression {
-        /// How it is packed.
-        compression: String,
-        /// What is wrong with it.
-        message: String,
-    },
-
-    /// A way to pack chunks that is not known.
-    #[error("its chunks are packed as `{}`; known: zstd, lz4, and unpacked ones", super::excerpt::shortened(found))]
-    UnknownCompression {
-        /// How they are packed.
-        found: String,
-    },
-
-    /// A file that fills the memory.
-    #[error("it promises to unpack to {unpacked} bytes; a file of its size may unpack to {allowed}")]
-    TooLarge {
-        /// What it says.
-        unpacked: u64,
-        /// What is granted.
-        allowed: u64,
-    },
-
-    /// No messages at all.
-    #[error("the recording holds no messages")]
-    Empty,
-
-    /// A topic that is not there.
-    #[error("there is no topic `{found}`")]
-    NoTopic {
-        /// What is asked for.
-        found: String,
-        /// What there is.
-        topics: String,
-    },
-
-    /// Several topics, and none asked for.
-    #[error("it is not clear which topic is meant")]
-    WhichTopic {
-        /// What there is.
-        topics: String,
-    },
-
-    /// Messages that are not JSON.
-    #[error("messages of {topic} are encoded as `{}`; needed: json", super::excerpt::shortened(found))]
-    Encoding {
-        /// The topic.
-        topic: String,
-        /// Their encoding.
-        found: String,
-    },
-
-    /// A message that is not like the first.
-    #[error("message {number}, of {time} s, {message}")]
-    Message {
-        /// Its number among all of the file.
-        number: usize,
-        /// When it was logged, in seconds.
-        time: String,
-        /// What is wrong with it.
-        message: String,
-    },
-
-    /// Messages without numbers.
-    #[error("the messages hold no numbers")]
-    NoNumbers,
-
-    /// A channel that is asked for, but not there.
-    #[error("there is no channel `{found}`")]
-    NoChannel {
-        /// What is asked for.
-        found: String,
-        /// What there is.
-        channels: String,
-    },
-
-    /// Messages at uneven times, and no period.
-    #[error("sequence {sequence}: {message}; steps are equally spaced")]
-    Uneven {
-        /// The sequence.
-        sequence: String,
-        /// What was found.
-        message: String,
-    },
-
-    /// A period that does not suit the messages.
-    #[error("sequence {sequence}: {message}")]
-    Resampling {
-        /// The sequence.
-        sequence: String,
-        /// What was found.
-        message: String,
-    },
 }
 
 /// What is wrong with a numpy array.
@@ -418,7 +422,7 @@ pub enum ArrayProblem {
     Header(&'static str),
 
     /// Elements that are not numbers.
-    #[error("an array of type `{found}`; needed: floats of 4 or 8 bytes, integers or booleans")]
+    #[error("an array of type `{}`; needed: floats, integers or booleans", super::excerpt::shortened(found))]
     Type {
         /// The type as numpy writes it.
         found: String,
@@ -433,6 +437,47 @@ pub enum ArrayProblem {
         needed: &'static str,
     },
 
+    /// More channels than steps: the axes may be another way round.
+    #[error("an array of shape {shape} would be {channels} channels of {steps} steps; it may be the other way round")]
+    MoreChannels {
+        /// The shape as numpy writes it.
+        shape: String,
+        /// Channels.
+        channels: usize,
+        /// Steps.
+        steps: usize,
+    },
+
+    /// The first axis looks like the steps of one recording.
+    #[error("an array of shape {shape} may be one recording: its values go on smoothly along the first axis")]
+    FirstAxisIsTime {
+        /// The shape as numpy writes it.
+        shape: String,
+    },
+
+    /// Axes that do not fit.
+    #[error("`axes = \"{axes}\"` does not fit {found}")]
+    Axes {
+        /// What was asked for.
+        axes: String,
+        /// What there is.
+        found: String,
+    },
+
+    /// An array that is asked for, but not there.
+    #[error("there is no array `{found}`")]
+    NoArray {
+        /// What is asked for.
+        found: String,
+    },
+
+    /// Arrays that do not go together.
+    #[error("its arrays differ in lengths and channels: {found}")]
+    Lengths {
+        /// The arrays with their shapes.
+        found: String,
+    },
+
     /// More or fewer bytes than the shape says.
     #[error("the array's header promises {promised} bytes, but {held} follow")]
     Size {
@@ -440,14 +485,5 @@ pub enum ArrayProblem {
         promised: String,
         /// Bytes that are there.
         held: usize,
-    },
-
-    /// Sequences on different channels.
-    #[error("{found} channels; needed: {needed}, as in the first array")]
-    Channels {
-        /// Channels of this array.
-        found: usize,
-        /// Channels of the first.
-        needed: usize,
     },
 }

@@ -25,11 +25,11 @@ fn good_files_are_read_in_a_small_multiple_of_their_size() {
     let data = Dataset::new(vec!["x".into(), "y".into()], vec![sequence]).unwrap();
     let fields = [Field { name: "", data: &data }];
     let files = [
-        ("x.csv", text_out::csv(&fields, ',').into_bytes(), 10),
-        ("x.txt", text_out::blocks(&fields).into_bytes(), 10),
+        ("x.csv", table::writing::csv(&fields, ',').into_bytes(), 10),
+        ("x.txt", table::writing::blocks(&fields).into_bytes(), 10),
         ("x.npy", npy::write("x.npy", &fields).unwrap(), 5),
         ("x.npz", npz::write("x.npz", &fields).unwrap(), 5),
-        ("x.mcap", mcap::tests::some_joints(), 50),
+        ("x.mcap", recording::tests::some_joints(), 50),
     ];
     for (name, bytes, factor) in files {
         let held = held(name, &bytes);
@@ -53,7 +53,7 @@ fn promises_of_terabytes_cost_nothing() {
             npz[at..at + 4].copy_from_slice(&0xffff_fff0_u32.to_le_bytes());
         }
     }
-    let mut mcap = mcap::tests::some_joints();
+    let mut mcap = recording::tests::some_joints();
     let chunk = mcap.windows(9).position(|window| window[0] == 0x06 && window[7..9] == [0, 0]).unwrap();
     mcap[chunk + 25..chunk + 33].copy_from_slice(&(1_u64 << 42).to_le_bytes());
     for (name, bytes) in [("x.npy", npy), ("x.npz", npz), ("x.mcap", mcap)] {
@@ -78,4 +78,89 @@ fn an_archive_unpacks_to_some_thousand_times_its_size_at_most() {
     let bytes = archive.finish().unwrap().into_inner();
     let held = held("x.npz", &bytes);
     assert!(held < 5000 * bytes.len() as u64, "{held} for {} bytes", bytes.len());
+}
+
+/// An archive whose directory names one member again and again, each by its own name.
+fn overlapping(times: usize) -> Vec<u8> {
+    let zeros = npy::array_bytes(&[100_000, 1], std::iter::repeat_n(0.0, 100_000));
+    let one = super::tests::archive(&[("a000000.npy", zeros)]);
+    let start = one.windows(4).rposition(|window| window == b"PK\x01\x02").unwrap();
+    let end = one.windows(4).rposition(|window| window == b"PK\x05\x06").unwrap();
+    let mut bytes = one[..start].to_vec();
+    for index in 0..times {
+        let mut entry = one[start..end].to_vec();
+        let name = entry.windows(7).position(|window| window == b"a000000").unwrap();
+        entry[name..name + 7].copy_from_slice(format!("a{index:06}").as_bytes());
+        bytes.extend(entry);
+    }
+    let (directory, mut last) = ((bytes.len() - start) as u32, one[end..].to_vec());
+    last[8..10].copy_from_slice(&(times as u16).to_le_bytes());
+    last[10..12].copy_from_slice(&(times as u16).to_le_bytes());
+    last[12..16].copy_from_slice(&directory.to_le_bytes());
+    bytes.extend(last);
+    bytes
+}
+
+#[test]
+fn members_that_share_bytes_are_refused() {
+    let bytes = overlapping(1000);
+    let error = parse_as(Path::new("x.npz"), &bytes, &Selection::default()).unwrap_err();
+    assert!(matches!(error, FileError::Overlap { .. }), "{error}");
+    assert!(held("x.npz", &bytes) < 8 << 20, "{}", held("x.npz", &bytes));
+    assert!(parse_as(Path::new("x.npz"), &overlapping(1), &Selection::default()).is_ok());
+}
+
+#[test]
+fn no_small_file_takes_long_or_much() {
+    let size = 64 << 10;
+    let repeated = |text: &str| text.repeat(size / text.len()).into_bytes();
+    let numbered = |format: &dyn Fn(usize) -> String| {
+        let mut text = String::new();
+        (0..)
+            .take_while(|index| {
+                text.push_str(&format(*index));
+                text.len() < size
+            })
+            .count();
+        text.into_bytes()
+    };
+    let mut tables = vec![
+        repeated("a,"),
+        repeated("1,"),
+        repeated("\n1\n"),
+        repeated("x\n"),
+        repeated("time,"),
+        repeated("[1 "),
+        repeated("\""),
+        repeated("# a b\n"),
+        repeated("1 # x\n"),
+        repeated("a\n1\n"),
+        repeated("# sequence: a\n1\n"),
+        repeated("sec,nsec,"),
+        repeated("[["),
+        numbered(&|index| format!("a{index}.sec,a{index}.nsec,")),
+        numbered(&|index| format!("X,X.{index},")),
+        numbered(&|index| format!("# sequence: {index}\n1\n")),
+    ];
+    let labels = numbered(&|index| format!("{index},1\n"));
+    tables.push([&b"sequence,x\n"[..], &labels].concat());
+    let twice = numbered(&|index| format!("{},1\n", index / 2));
+    tables.push([&b"trial,x\n"[..], &twice].concat());
+    let restarts = numbered(&|index| format!("{},1\n", index % 2));
+    tables.push([&b"time,x\n"[..], &restarts].concat());
+    let names = numbered(&|index| format!("a{index}.sec,"));
+    tables.push([&names[..], b"\n", &b"1,".repeat(names.iter().filter(|byte| **byte == b',').count())].concat());
+    let fields = numbered(&|index| format!("('f{index}','<f8'),"));
+    let header =
+        format!("{{'descr': [{}], 'fortran_order': False, 'shape': (1,)}}", String::from_utf8(fields).unwrap());
+    let npy = [b"\x93NUMPY\x01\x00", &(header.len().min(60_000) as u16).to_le_bytes()[..], header.as_bytes()].concat();
+    let files = tables.into_iter().map(|table| ("x.csv", table)).chain([("x.npy", npy)]);
+    for (name, bytes) in files {
+        let start = std::time::Instant::now();
+        let held = held(name, &bytes);
+        let shown = String::from_utf8_lossy(&bytes[..20]).into_owned();
+        // Unoptimised, and beside other tests: a second of the program is less.
+        assert!(start.elapsed().as_secs() < 10, "{shown:?}: {:?}", start.elapsed());
+        assert!(held < FREE + 1000 * bytes.len() as u64, "{shown:?}: {held} for {}", bytes.len());
+    }
 }

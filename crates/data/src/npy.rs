@@ -4,34 +4,73 @@
 //! 93 "NUMPY" major minor, length of the header, {'descr': '<f8', 'fortran_order': False, 'shape': (12, 1000, 2), }, data
 //! ```
 //!
-//! An array of three axes is sequences x steps x channels, of two steps x channels, of one the steps of one channel.
-//! Nothing is allocated on the word of a header: its promise is compared with the bytes that are there.
+//! An array of three axes is sequences x steps x channels, of two steps x channels, of one the steps of one channel; see
+//! [`crate::arrays`]. The fields of a structured array are arrays side by side. Nothing is allocated on the word of a header:
+//! its promise is compared with the bytes that are there.
 
-use scrnn::dataset::{Dataset, Sequence};
+use scrnn::dataset::Sequence;
 
-use super::{ArrayProblem, Field, FileError, numbered};
+use crate::arrays::{Array, Texts, shape_text, to_samples};
+use crate::budget::{Budget, OverBudget};
+use crate::format::Source;
+use crate::literal::Literal;
+use crate::samples::Samples;
+use crate::{ArrayProblem, Field, FileError, Selection};
 
 const MAGIC: &[u8] = b"\x93NUMPY";
 /// numpy itself refuses to read a longer header.
 const LONGEST_HEADER: usize = 10_000;
 
-/// Numbers on up to three axes.
+/// What a file holds.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Array {
-    /// How many axes the file has.
-    pub axes: usize,
-    /// Sequences, steps, channels; missing axes have length 1.
-    pub shape: [usize; 3],
-    /// The last axis varies fastest.
-    pub values: Vec<f64>,
+pub enum Contents {
+    /// An array, or one for each field of a structured one.
+    Arrays(Vec<Array>),
+    /// Texts.
+    Texts(Vec<String>),
+    /// Something that is neither: the type as numpy names it.
+    Other(String),
+}
+
+/// Why a file cannot be read.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Refused {
+    /// It is not what it should be.
+    Array(ArrayProblem),
+    /// It would fill the memory.
+    Budget(OverBudget),
+}
+
+impl From<ArrayProblem> for Refused {
+    fn from(problem: ArrayProblem) -> Self {
+        Self::Array(problem)
+    }
+}
+
+impl From<OverBudget> for Refused {
+    fn from(problem: OverBudget) -> Self {
+        Self::Budget(problem)
+    }
 }
 
 /// Reads the file called `path`.
-pub fn read(path: &str, bytes: &[u8]) -> Result<Dataset, FileError> {
-    let Array { shape: [_, steps, channels], values, .. } =
-        parse(bytes).map_err(|problem| file_error(path, problem))?;
-    let sequences = values.chunks_exact(steps * channels).map(<[f64]>::to_vec);
-    numbered(path, channels, sequences.enumerate().map(|(s, values)| ((s + 1).to_string(), values)).collect())
+pub fn read(source: &Source<'_>, selection: &Selection) -> Result<Samples, FileError> {
+    let path = source.name();
+    let contents = parse(&source.bytes()?, source.budget()).map_err(|refused| file_error(path, path, refused))?;
+    let wrong = |found: String| file_error(path, path, ArrayProblem::Type { found }.into());
+    match contents {
+        Contents::Arrays(arrays) => {
+            if let [Array { shape, .. }] = arrays.as_slice()
+                && shape.is_empty()
+            {
+                let needed = "at least one axis";
+                return Err(file_error(path, path, ArrayProblem::Shape { found: shape_text(shape), needed }.into()));
+            }
+            to_samples(path, arrays, &[] as &[Texts], selection)
+        }
+        Contents::Texts(_) => Err(wrong("text".to_owned())),
+        Contents::Other(found) => Err(wrong(found)),
+    }
 }
 
 /// The bytes of a file of the only field.
@@ -49,15 +88,27 @@ pub fn write(path: &str, fields: &[Field<'_>]) -> Result<Vec<u8>, FileError> {
     Ok(array_bytes(&[sequences.len(), longest, field.data.channels().len()], values))
 }
 
-/// The problem with a hint at its cure.
-pub fn file_error(path: &str, problem: ArrayProblem) -> FileError {
+/// The problem with a hint at its cure. `file` is the file that the array at `path` is in.
+pub fn file_error(file: &str, path: &str, refused: Refused) -> FileError {
+    let problem = match refused {
+        Refused::Array(problem) => problem,
+        Refused::Budget(problem) => return FileError::OverBudget { path: path.to_owned(), problem },
+    };
+    let name = file.rsplit(['/', '\\']).next().unwrap_or(file);
     let help = match &problem {
-        ArrayProblem::Type { found } if found.contains('O') => {
-            Some("these are Python objects; save sequences of different lengths by numpy.savez(path, *sequences)")
+        ArrayProblem::Type { found } if found.contains('O') => Some(format!(
+            "these are Python objects, which only Python can read; if they are arrays, this saves them: \
+             import numpy; numpy.savez(\"sequences.npz\", *numpy.load(\"{name}\", allow_pickle=True))"
+        )),
+        ArrayProblem::Type { found } if found.contains(['M', 'm']) => {
+            Some("these are dates; save numbers, e.g. array.astype(\"int64\")".to_owned())
         }
-        ArrayProblem::Type { .. } => Some("convert it by array.astype(float)"),
-        ArrayProblem::Shape { .. } => Some("axes are sequences x steps x channels, or steps x channels"),
-        ArrayProblem::Size { .. } => Some("the file may be cut off, or hold more than one array"),
+        ArrayProblem::Type { found } if found.contains('c') => {
+            Some("these are complex numbers; save numpy.stack([array.real, array.imag], axis=-1)".to_owned())
+        }
+        ArrayProblem::Type { .. } => Some("save numbers, e.g. by array.astype(float)".to_owned()),
+        ArrayProblem::Shape { .. } => Some("axes are sequences x steps x channels, or steps x channels".to_owned()),
+        ArrayProblem::Size { .. } => Some("the file may be cut off, or hold more than one array".to_owned()),
         _ => None,
     };
     FileError::Array { path: path.to_owned(), problem, help }
@@ -80,140 +131,249 @@ pub fn array_bytes(shape: &[usize], values: impl Iterator<Item = f64>) -> Vec<u8
 }
 
 /// Reads an array that fills `bytes`.
-pub fn parse(bytes: &[u8]) -> Result<Array, ArrayProblem> {
+pub fn parse(bytes: &[u8], budget: &Budget) -> Result<Contents, Refused> {
     let after_magic = bytes.strip_prefix(MAGIC).ok_or(ArrayProblem::NotNumpy)?;
     let ends_early = ArrayProblem::Header("it ends early");
     let (length, rest) = match *after_magic {
         [1, 0, a, b, ref rest @ ..] => (usize::from(u16::from_le_bytes([a, b])), rest),
         [2 | 3, 0, a, b, c, d, ref rest @ ..] => (u32::from_le_bytes([a, b, c, d]) as usize, rest),
-        [1..=3, 0, ..] => return Err(ends_early),
-        [major, minor, ..] => return Err(ArrayProblem::Version { major, minor }),
-        _ => return Err(ends_early),
+        [1..=3, 0, ..] => return Err(ends_early.into()),
+        [major, minor, ..] => return Err(ArrayProblem::Version { major, minor }.into()),
+        _ => return Err(ends_early.into()),
     };
     if length > LONGEST_HEADER {
-        return Err(ArrayProblem::Header("it is longer than 10000 bytes"));
+        return Err(ArrayProblem::Header("it is longer than 10000 bytes").into());
     }
     let (header, data) = rest.split_at_checked(length).ok_or(ends_early)?;
     let header = std::str::from_utf8(header).map_err(|_| ArrayProblem::Header("it is not text"))?;
-    let Header { kind, shape: lengths, column_major } = Header::parse(header)?;
-
-    let shape = match *lengths {
-        [t] => [1, t, 1],
-        [t, i] => [1, t, i],
-        [s, t, i] => [s, t, i],
-        _ => return Err(shape_problem(&lengths, "one, two or three axes")),
+    let Header { kind, shape, column_major } = Header::parse(header)?;
+    let count = shape.iter().try_fold(1_usize, |product, &length| product.checked_mul(length));
+    let size = match &kind {
+        Kind::Plain(element) => element.size,
+        Kind::Record(record) => record.size,
+        Kind::Other(name) => return Ok(Contents::Other(name.clone())),
     };
-    let element = kind.element().ok_or_else(|| ArrayProblem::Type { found: kind.name.to_owned() })?;
-    let promised = shape.iter().try_fold(element.size(), |product, &length| product.checked_mul(length));
+    let promised = count.and_then(|count| count.checked_mul(size));
     if promised != Some(data.len()) {
         let promised = promised.map_or_else(|| "over 2^64".to_owned(), |promised| promised.to_string());
-        return Err(ArrayProblem::Size { promised, held: data.len() });
+        return Err(ArrayProblem::Size { promised, held: data.len() }.into());
     }
-    if data.is_empty() {
-        return Err(shape_problem(&lengths, "at least one sample"));
+    let count = count.unwrap_or(0);
+    if count == 0 || data.is_empty() {
+        return Err(ArrayProblem::Shape { found: shape_text(&shape), needed: "at least one sample" }.into());
     }
-    let values = element.numbers(data, kind.big_endian());
-    let values = if column_major { row_major(shape, &values) } else { values };
-    Ok(Array { axes: lengths.len(), shape, values })
-}
-
-fn shape_problem(lengths: &[usize], needed: &'static str) -> ArrayProblem {
-    let found: Vec<String> = lengths.iter().map(usize::to_string).collect();
-    ArrayProblem::Shape { found: format!("({})", found.join(", ")), needed }
+    match kind {
+        Kind::Other(name) => Ok(Contents::Other(name)),
+        Kind::Plain(Element { kind: Number::Text(letter), .. }) => {
+            budget.take(data.len() + 64 * count)?;
+            Ok(Contents::Texts(data.chunks_exact(size.max(1)).map(|bytes| text(bytes, letter)).collect()))
+        }
+        Kind::Plain(element) => {
+            budget.take_values::<f64>(if column_major { 2 * count } else { count })?;
+            let values = element.numbers(data);
+            let values = if column_major { row_major(&shape, &values) } else { values };
+            Ok(Contents::Arrays(vec![Array { name: String::new(), shape, values }]))
+        }
+        Kind::Record(record) => {
+            let mut arrays = Vec::new();
+            for RecordField { name, element, shape: below, offset } in record.fields {
+                if matches!(element.kind, Number::Text(_)) {
+                    continue;
+                }
+                let each: usize = below.iter().product();
+                if each == 0 {
+                    continue;
+                }
+                budget.take_values::<f64>(count.saturating_mul(each))?;
+                let mut values = Vec::with_capacity(count * each);
+                for row in data.chunks_exact(size.max(1)) {
+                    let cells = offset.checked_add(each * element.size).and_then(|end| row.get(offset..end));
+                    values.extend(element.numbers(cells.unwrap_or_default()));
+                }
+                let shape = shape.iter().copied().chain(below).collect();
+                arrays.push(Array { name, shape, values });
+            }
+            Ok(Contents::Arrays(arrays))
+        }
+    }
 }
 
 /// From the first axis fastest (Fortran's order) to the last axis fastest.
-fn row_major([sequences, steps, channels]: [usize; 3], values: &[f64]) -> Vec<f64> {
+fn row_major(shape: &[usize], values: &[f64]) -> Vec<f64> {
+    let mut strides = Vec::with_capacity(shape.len());
+    let mut stride = 1;
+    for &length in shape {
+        strides.push(stride);
+        stride *= length;
+    }
+    let mut index = vec![0; shape.len()];
+    let mut at = 0;
     let mut out = Vec::with_capacity(values.len());
-    for s in 0..sequences {
-        for t in 0..steps {
-            out.extend((0..channels).map(|i| values[s + sequences * (t + steps * i)]));
+    for _ in 0..values.len() {
+        out.push(values[at]);
+        for axis in (0..shape.len()).rev() {
+            index[axis] += 1;
+            at += strides[axis];
+            if index[axis] < shape[axis] {
+                break;
+            }
+            at -= strides[axis] * index[axis];
+            index[axis] = 0;
         }
     }
     out
 }
 
+/// numpy's texts: of bytes (`S`) or of code points in four bytes (`U`), filled up with zeros.
+fn text(bytes: &[u8], letter: u8) -> String {
+    let clean = match letter {
+        b'S' => String::from_utf8_lossy(bytes).into_owned(),
+        _ => {
+            let points = bytes.as_chunks::<4>().0.iter().map(|point| u32::from_le_bytes(*point));
+            points.map(|point| char::from_u32(point).unwrap_or('\u{fffd}')).collect()
+        }
+    };
+    clean.trim_end_matches('\0').to_owned()
+}
+
 /// What the dictionary in a header says.
-struct Header<'a> {
-    kind: Kind<'a>,
+struct Header {
+    kind: Kind,
     shape: Vec<usize>,
     column_major: bool,
 }
 
-impl<'a> Header<'a> {
-    fn parse(text: &'a str) -> Result<Self, ArrayProblem> {
-        let entry = |key: &str, problem| {
-            let found = ['\'', '"'].into_iter().find_map(|quote| text.split_once(&format!("{quote}{key}{quote}")));
-            let value = found.and_then(|(_, rest)| rest.trim_start().strip_prefix(':')).map(str::trim_start);
-            value.ok_or(ArrayProblem::Header(problem))
+/// What an array's elements are.
+enum Kind {
+    Plain(Element),
+    Record(Record),
+    Other(String),
+}
+
+/// Fields side by side.
+struct Record {
+    fields: Vec<RecordField>,
+    size: usize,
+}
+
+struct RecordField {
+    name: String,
+    element: Element,
+    shape: Vec<usize>,
+    offset: usize,
+}
+
+impl Header {
+    fn parse(text: &str) -> Result<Self, ArrayProblem> {
+        let damaged = ArrayProblem::Header;
+        let header = Literal::parse(text).ok_or(damaged("it is no dictionary of Python"))?;
+        let descr = header.get("descr").ok_or(damaged("it has no `descr`"))?;
+        let order = header.get("fortran_order").ok_or(damaged("it has no `fortran_order`"))?;
+        let Literal::Truth(column_major) = *order else {
+            return Err(damaged("`fortran_order` is neither True nor False"));
         };
-        let descr = entry("descr", "it has no `descr`")?;
-        let name = ['\'', '"'].into_iter().find_map(|quote| descr.strip_prefix(quote)?.split_once(quote));
-        let Some((name, _)) = name else {
-            return Err(ArrayProblem::Type { found: "a record".to_owned() });
-        };
-        let order = entry("fortran_order", "it has no `fortran_order`")?;
-        let column_major = order.starts_with("True");
-        if !column_major && !order.starts_with("False") {
-            return Err(ArrayProblem::Header("`fortran_order` is neither True nor False"));
+        let shape = header.get("shape").ok_or(damaged("it has no `shape`"))?;
+        let shape = shape.list().and_then(|_| shape.lengths()).ok_or(damaged("`shape` is not a tuple of lengths"))?;
+        if shape.len() > 32 {
+            return Err(damaged("`shape` has more than 32 axes"));
         }
-        let shape = entry("shape", "it has no `shape`")?;
-        let shape = shape.strip_prefix('(').and_then(|rest| rest.split_once(')')).map(|(lengths, _)| lengths);
-        let damaged = ArrayProblem::Header("`shape` is not a tuple of lengths");
-        let lengths = shape.ok_or_else(|| damaged.clone())?.split(',').map(str::trim).filter(|part| !part.is_empty());
-        // Python 2 wrote long integers as 12L.
-        let lengths = lengths.map(|length| length.trim_end_matches('L').parse()).collect::<Result<_, _>>();
-        Ok(Self { kind: Kind { name }, shape: lengths.map_err(|_| damaged)?, column_major })
+        Ok(Self { kind: kind(descr)?, shape, column_major })
+    }
+}
+
+fn kind(descr: &Literal) -> Result<Kind, ArrayProblem> {
+    if let Some(name) = descr.text() {
+        return Ok(Element::of(name).map_or_else(|| Kind::Other(name.to_owned()), Kind::Plain));
+    }
+    let fields = descr.list().ok_or(ArrayProblem::Header("`descr` is neither a type nor a list of fields"))?;
+    let mut record = Record { fields: Vec::new(), size: 0 };
+    for field in fields {
+        let parts = field.list().unwrap_or_default();
+        // A title may stand before the name.
+        let name = parts.first().and_then(|name| name.text().or_else(|| name.list()?.last()?.text()));
+        let (Some(name), Some(of)) = (name, parts.get(1)) else {
+            return Err(ArrayProblem::Header("a field has no name or no type"));
+        };
+        let Some(of) = of.text() else { return Ok(Kind::Other("records within records".to_owned())) };
+        let shape = match parts.get(2) {
+            Some(shape) => shape.lengths().ok_or(ArrayProblem::Header("a field's shape is not a tuple of lengths"))?,
+            None => Vec::new(),
+        };
+        let each = shape.iter().try_fold(1_usize, |product, &length| product.checked_mul(length));
+        let size = |element: usize| {
+            each.and_then(|each| each.checked_mul(element)).and_then(|size| size.checked_add(record.size))
+        };
+        let too_large = ArrayProblem::Header("a field's shape is too large");
+        // Padding between fields.
+        if let Some(length) = of.trim_start_matches(['<', '>', '|', '=']).strip_prefix('V') {
+            let length = length.parse().map_err(|_| ArrayProblem::Header("a field's length is no number"))?;
+            record.size = size(length).ok_or(too_large)?;
+            continue;
+        }
+        let Some(element) = Element::of(of) else { return Ok(Kind::Other(format!("{of} in field {name}"))) };
+        let next = size(element.size).ok_or(too_large)?;
+        record.fields.push(RecordField { name: name.to_owned(), element, shape, offset: record.size });
+        record.size = next;
+    }
+    if record.fields.is_empty() {
+        Ok(Kind::Other("a record without fields".to_owned()))
+    } else {
+        Ok(Kind::Record(record))
     }
 }
 
 /// An element's type as numpy names it: `<f8` is a float of 8 bytes, the lowest first.
 #[derive(Debug, Clone, Copy)]
-struct Kind<'a> {
-    name: &'a str,
-}
-
-impl Kind<'_> {
-    fn big_endian(&self) -> bool {
-        self.name.starts_with('>')
-    }
-
-    fn element(&self) -> Option<Element> {
-        Some(match self.name.trim_start_matches(['<', '>', '|', '=']) {
-            "f4" => Element::Four(|bytes| f32::from_le_bytes(bytes).into()),
-            "f8" => Element::Eight(f64::from_le_bytes),
-            "i1" => Element::One(|bytes| i8::from_le_bytes(bytes).into()),
-            "i2" => Element::Two(|bytes| i16::from_le_bytes(bytes).into()),
-            "i4" => Element::Four(|bytes| i32::from_le_bytes(bytes).into()),
-            "i8" => Element::Eight(|bytes| i64::from_le_bytes(bytes) as f64),
-            "u1" | "b1" => Element::One(|[byte]| byte.into()),
-            "u2" => Element::Two(|bytes| u16::from_le_bytes(bytes).into()),
-            "u4" => Element::Four(|bytes| u32::from_le_bytes(bytes).into()),
-            "u8" => Element::Eight(|bytes| u64::from_le_bytes(bytes) as f64),
-            _ => return None,
-        })
-    }
+struct Element {
+    kind: Number,
+    size: usize,
+    big_endian: bool,
 }
 
 /// How the bytes of one element, the lowest first, make a number.
-enum Element {
+#[derive(Debug, Clone, Copy)]
+enum Number {
     One(fn([u8; 1]) -> f64),
     Two(fn([u8; 2]) -> f64),
     Four(fn([u8; 4]) -> f64),
     Eight(fn([u8; 8]) -> f64),
+    /// A float of more than 8 bytes.
+    Long,
+    /// Text, of this letter.
+    Text(u8),
 }
 
 impl Element {
-    fn size(&self) -> usize {
-        match self {
-            Self::One(_) => 1,
-            Self::Two(_) => 2,
-            Self::Four(_) => 4,
-            Self::Eight(_) => 8,
-        }
+    fn of(name: &str) -> Option<Self> {
+        let bare = name.trim_start_matches(['<', '>', '|', '=']);
+        let (kind, size) = match bare {
+            "f2" => (Number::Two(|bytes| half(u16::from_le_bytes(bytes))), 2),
+            "f4" => (Number::Four(|bytes| f32::from_le_bytes(bytes).into()), 4),
+            "f8" => (Number::Eight(f64::from_le_bytes), 8),
+            "f12" => (Number::Long, 12),
+            "f16" => (Number::Long, 16),
+            "i1" => (Number::One(|bytes| i8::from_le_bytes(bytes).into()), 1),
+            "i2" => (Number::Two(|bytes| i16::from_le_bytes(bytes).into()), 2),
+            "i4" => (Number::Four(|bytes| i32::from_le_bytes(bytes).into()), 4),
+            "i8" => (Number::Eight(|bytes| i64::from_le_bytes(bytes) as f64), 8),
+            "u1" | "b1" => (Number::One(|[byte]| byte.into()), 1),
+            "u2" => (Number::Two(|bytes| u16::from_le_bytes(bytes).into()), 2),
+            "u4" => (Number::Four(|bytes| u32::from_le_bytes(bytes).into()), 4),
+            "u8" => (Number::Eight(|bytes| u64::from_le_bytes(bytes) as f64), 8),
+            _ => {
+                let (letter, length) = bare.split_at_checked(1)?;
+                let length: usize = length.parse().ok().filter(|length| *length > 0)?;
+                match letter {
+                    "S" => (Number::Text(b'S'), length),
+                    "U" => (Number::Text(b'U'), length.checked_mul(4)?),
+                    _ => return None,
+                }
+            }
+        };
+        Some(Self { kind, size, big_endian: name.starts_with('>') })
     }
 
-    fn numbers(&self, data: &[u8], big_endian: bool) -> Vec<f64> {
+    fn numbers(&self, data: &[u8]) -> Vec<f64> {
         fn all<const N: usize>(data: &[u8], big_endian: bool, number: fn([u8; N]) -> f64) -> Vec<f64> {
             let ordered = |mut bytes: [u8; N]| {
                 if big_endian {
@@ -223,13 +383,77 @@ impl Element {
             };
             data.as_chunks::<N>().0.iter().copied().map(ordered).collect()
         }
-        match *self {
-            Self::One(number) => all(data, big_endian, number),
-            Self::Two(number) => all(data, big_endian, number),
-            Self::Four(number) => all(data, big_endian, number),
-            Self::Eight(number) => all(data, big_endian, number),
+        match self.kind {
+            Number::One(number) => all(data, self.big_endian, number),
+            Number::Two(number) => all(data, self.big_endian, number),
+            Number::Four(number) => all(data, self.big_endian, number),
+            Number::Eight(number) => all(data, self.big_endian, number),
+            Number::Long => long(data, self.size, self.big_endian),
+            Number::Text(_) => Vec::new(),
         }
     }
+}
+
+/// IEEE 754's binary16: a sign, 5 bits of exponent, 10 of fraction.
+fn half(bits: u16) -> f64 {
+    let sign = if bits >> 15 == 1 { -1.0 } else { 1.0 };
+    let (exponent, fraction) = (i32::from(bits >> 10 & 0x1f), f64::from(bits & 0x3ff));
+    sign * match exponent {
+        0 => fraction * 2.0_f64.powi(-24),
+        31 if fraction == 0.0 => f64::INFINITY,
+        31 => f64::NAN,
+        _ => (1.0 + fraction / 1024.0) * 2.0_f64.powi(exponent - 15),
+    }
+}
+
+/// C's `long double`: of 80 bits with an explicit leading one where Intel made the processor, else of 128 (binary128). The
+/// leading one is there in all numbers, or it is not.
+fn long(data: &[u8], size: usize, big_endian: bool) -> Vec<f64> {
+    let mut wide: Vec<[u8; 16]> = Vec::with_capacity(data.len() / size);
+    for bytes in data.chunks_exact(size) {
+        let mut all = [0; 16];
+        all[..size].copy_from_slice(bytes);
+        if big_endian {
+            all[..size].reverse();
+        }
+        wide.push(all);
+    }
+    let bits = |bytes: &[u8; 16]| {
+        (u64::from_le_bytes(bytes[..8].try_into().unwrap_or_default()), u16::from_le_bytes([bytes[8], bytes[9]]))
+    };
+    let leading_one = |bytes: &[u8; 16]| {
+        let (mantissa, exponent) = bits(bytes);
+        (mantissa >> 63 == 1) == (exponent & 0x7fff != 0)
+    };
+    let padded = wide.iter().all(|bytes| bytes[10..] == [0; 6]);
+    let filled = wide.iter().any(|bytes| bits(bytes).0 != 0);
+    let is_80 = padded || filled && wide.iter().all(leading_one);
+    let number = |sign: bool, exponent: i32, fraction: f64| {
+        // In two steps: 2^exponent alone may be beyond all that can be held.
+        let half = exponent / 2;
+        let size = fraction * 2.0_f64.powi(half) * 2.0_f64.powi(exponent - half);
+        if sign { -size } else { size }
+    };
+    let of_80 = |bytes: &[u8; 16]| {
+        let (mantissa, exponent) = bits(bytes);
+        let (sign, exponent) = (exponent >> 15 == 1, i32::from(exponent & 0x7fff));
+        match exponent {
+            0x7fff if mantissa << 1 == 0 => number(sign, 0, f64::INFINITY),
+            0x7fff => f64::NAN,
+            _ => number(sign, exponent - 16383 - 63, mantissa as f64),
+        }
+    };
+    let of_128 = |bytes: &[u8; 16]| {
+        let all = u128::from_le_bytes(*bytes);
+        let (sign, exponent, fraction) = (all >> 127 == 1, (all >> 112 & 0x7fff) as i32, all & ((1 << 112) - 1));
+        match exponent {
+            0x7fff if fraction == 0 => number(sign, 0, f64::INFINITY),
+            0x7fff => f64::NAN,
+            0 => number(sign, -16382 - 112, fraction as f64),
+            _ => number(sign, exponent - 16383 - 112, (fraction | 1 << 112) as f64),
+        }
+    };
+    wide.iter().map(|bytes| if is_80 { of_80(bytes) } else { of_128(bytes) }).collect()
 }
 
 #[cfg(test)]
@@ -245,9 +469,23 @@ mod tests {
         bytes
     }
 
+    fn arrays(bytes: &[u8]) -> Vec<Array> {
+        match parse(bytes, &Budget::of_file(bytes.len() as u64)).unwrap() {
+            Contents::Arrays(arrays) => arrays,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn problem(bytes: &[u8]) -> ArrayProblem {
+        match parse(bytes, &Budget::of_file(bytes.len() as u64)) {
+            Err(Refused::Array(problem)) => problem,
+            other => panic!("{other:?}"),
+        }
+    }
+
     fn values(descr: &str, data: &[u8], count: usize) -> Vec<f64> {
         let header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({count},), }}\n");
-        parse(&file(&header, data)).unwrap().values
+        arrays(&file(&header, data)).remove(0).values
     }
 
     #[test]
@@ -275,36 +513,37 @@ mod tests {
                 data.extend((0..2_u8).map(|s| 100 * s + 10 * t + i));
             }
         }
-        let array = parse(&file("{'descr':'|u1','fortran_order':True,'shape':(2,3,2)}", &data)).unwrap();
-        assert_eq!((array.axes, array.shape), (3, [2, 3, 2]));
+        let array = arrays(&file("{'descr':'|u1','fortran_order':True,'shape':(2,3,2)}", &data)).remove(0);
+        assert_eq!(array.shape, [2, 3, 2]);
         assert_eq!(array.values, [0., 1., 10., 11., 20., 21., 100., 101., 110., 111., 120., 121.]);
     }
 
     #[test]
     fn the_header_may_be_written_in_other_ways() {
         let header = "{\"shape\": (1L, 2L), 'fortran_order' : False, \"descr\": \"|u1\"}";
-        let array = parse(&file(header, &[7, 8])).unwrap();
-        assert_eq!((array.axes, array.shape, array.values), (2, [1, 1, 2], vec![7.0, 8.0]));
+        let array = arrays(&file(header, &[7, 8])).remove(0);
+        assert_eq!((array.shape, array.values), (vec![1, 2], vec![7.0, 8.0]));
     }
 
     #[test]
     fn a_promise_that_the_file_does_not_keep_is_refused() {
         let header = |shape: &str| format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}");
-        let problem = |shape: &str, data: &[u8]| parse(&file(&header(shape), data)).unwrap_err().to_string();
+        let problem = |shape: &str, data: &[u8]| problem(&file(&header(shape), data)).to_string();
         assert_eq!(problem("(3,)", &[0; 16]), "the array's header promises 24 bytes, but 16 follow");
         assert_eq!(problem("(1,)", &[0; 16]), "the array's header promises 8 bytes, but 16 follow");
         assert!(problem("(1000000000000, 1000000, 1)", &[0; 8]).contains("promises 8000000000000000000 bytes"));
         assert!(problem("(18446744073709551615, 2)", &[0; 8]).contains("over 2^64"));
         assert!(problem("(0, 2)", &[]).starts_with("an array of shape (0, 2)"));
-        assert!(problem("()", &[0; 8]).starts_with("an array of shape ()"));
-        assert!(problem("(1, 1, 1, 1)", &[0; 8]).starts_with("an array of shape (1, 1, 1, 1)"));
     }
 
     #[test]
     fn what_is_not_numbers_is_named() {
-        let problem = |bytes: &[u8]| parse(bytes).unwrap_err();
-        let of_type = |descr: &str| problem(&file(&format!("{{'descr': {descr}, 'shape': (1,)}}"), &[0; 8]));
-        assert_eq!(of_type("[('a', '<f8')]"), ArrayProblem::Type { found: "a record".into() });
+        let of_type = |descr: &str| {
+            let bytes = file(&format!("{{'descr': {descr}, 'fortran_order': False, 'shape': (1,)}}"), &[0; 8]);
+            parse(&bytes, &Budget::of(1000)).unwrap()
+        };
+        assert_eq!(of_type("'<M8[D]'"), Contents::Other("<M8[D]".into()));
+        assert_eq!(of_type("[('a', '|O')]"), Contents::Other("|O in field a".into()));
         assert_eq!(problem(b"y1,y2\n"), ArrayProblem::NotNumpy);
         assert_eq!(problem(b"\x93NUMPY\x01"), ArrayProblem::Header("it ends early"));
         assert_eq!(problem(b"\x93NUMPY\x04\x00"), ArrayProblem::Version { major: 4, minor: 0 });
@@ -312,8 +551,55 @@ mod tests {
             problem(b"\x93NUMPY\x02\x00\xff\xff\xff\xff"),
             ArrayProblem::Header("it is longer than 10000 bytes")
         );
-        let objects = problem(&file("{'descr': '|O', 'fortran_order': False, 'shape': (1,)}", &[0; 8]));
-        let help = miette::Diagnostic::help(&file_error("x.npy", objects)).unwrap().to_string();
-        assert!(help.contains("numpy.savez"), "{help}");
+        let objects = ArrayProblem::Type { found: "|O".into() }.into();
+        let help = miette::Diagnostic::help(&file_error("a/x.npy", "a/x.npy", objects)).unwrap().to_string();
+        assert!(help.ends_with("numpy.savez(\"sequences.npz\", *numpy.load(\"x.npy\", allow_pickle=True))"), "{help}");
+    }
+
+    #[test]
+    fn floats_of_other_sizes_are_read() {
+        let halves: Vec<u8> =
+            [0x3c00_u16, 0xc000, 0x0001, 0x3555, 0x7c00].iter().flat_map(|bits| bits.to_le_bytes()).collect();
+        assert_eq!(values("<f2", &halves, 5), [1.0, -2.0, 2.0_f64.powi(-24), 0.333_251_953_125, f64::INFINITY]);
+        // -0.5 and 3, of 80 bits in 16 bytes.
+        let mut intel = [0; 32];
+        intel[7] = 0x80;
+        intel[8..10].copy_from_slice(&0xbffe_u16.to_le_bytes());
+        intel[23] = 0xc0;
+        intel[24..26].copy_from_slice(&0x4000_u16.to_le_bytes());
+        assert_eq!(values("<f16", &intel, 2), [-0.5, 3.0]);
+        let quad = [(0xbffe_u128 << 112), (0x4000_u128 << 112) + (1 << 111)];
+        let quad: Vec<u8> = quad.iter().flat_map(|bits| bits.to_le_bytes()).collect();
+        assert_eq!(values("<f16", &quad, 2), [-0.5, 3.0]);
+    }
+
+    #[test]
+    fn the_fields_of_records_are_arrays() {
+        let header = "{'descr': [('t', '<f8'), ('name', '<U2'), ('', '|V2'), ('q', '<i2', (2,))], 'fortran_order': False, 'shape': (2,)}";
+        let mut data = Vec::new();
+        for row in 0..2_i16 {
+            data.extend(f64::from(row).to_le_bytes());
+            data.extend([0; 10]);
+            data.extend((10 + row).to_le_bytes());
+            data.extend((20 + row).to_le_bytes());
+        }
+        let fields = arrays(&file(header, &data));
+        assert_eq!(fields[0], Array { name: "t".into(), shape: vec![2], values: vec![0.0, 1.0] });
+        assert_eq!(fields[1], Array { name: "q".into(), shape: vec![2, 2], values: vec![10.0, 20.0, 11.0, 21.0] });
+        assert_eq!(fields.len(), 2);
+        let huge = "{'descr': [('q', '<f8', (4611686018427387904, 4))], 'fortran_order': False, 'shape': (1,)}";
+        assert_eq!(problem(&file(huge, &[0; 8])), ArrayProblem::Header("a field's shape is too large"));
+        let zero = "{'descr': [('q', '<f8', (0,))], 'fortran_order': False, 'shape': (4611686018427387904,)}";
+        assert!(parse(&file(zero, &[]), &Budget::of(1000)).is_err());
+    }
+
+    #[test]
+    fn texts_are_read_as_texts() {
+        let header = "{'descr': '<U2', 'fortran_order': False, 'shape': (2,)}";
+        let data: Vec<u8> = ['a', 'b', 'c', '\0'].iter().flat_map(|&c| u32::from(c).to_le_bytes()).collect();
+        assert_eq!(
+            parse(&file(header, &data), &Budget::of(10_000)).unwrap(),
+            Contents::Texts(vec!["ab".into(), "c".into()])
+        );
     }
 }

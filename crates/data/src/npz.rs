@@ -1,54 +1,89 @@
-//! Numpy arrays in a zip archive: `.npz`.
+//! Numpy arrays in a zip archive: `.npz`. What they are together, [`crate::arrays`] tells.
 //!
-//! Each array is a sequence: steps x channels, or the steps of one channel. A single array of three axes holds all
-//! sequences instead. Sequences are in the order of the archive and have the arrays' names.
+//! Members that are no arrays (notes, what other systems leave) are passed over. Members must not share bytes: else a small
+//! archive could unpack to anything.
 
+use std::collections::HashSet;
 use std::io::{Cursor, Read, Write};
 
-use scrnn::dataset::Dataset;
 use zip::result::ZipError;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
-use super::npy::{Array, array_bytes, file_error, parse};
-use super::{ArrayProblem, Field, FileError, numbered};
+use super::npy::{Contents, array_bytes, file_error, parse};
+use crate::arrays::{Texts, to_samples};
+use crate::excerpt::shortened;
+use crate::format::Source;
+use crate::remark::Remark;
+use crate::samples::Samples;
+use crate::{ArrayProblem, Field, FileError, Selection};
 
 /// Reads the file called `path`.
-pub fn read(path: &str, bytes: &[u8]) -> Result<Dataset, FileError> {
+pub fn read(source: &Source<'_>, selection: &Selection) -> Result<Samples, FileError> {
+    let (path, bytes, budget) = (source.name(), source.bytes()?, source.budget());
     let broken = |source| FileError::Archive { path: path.to_owned(), source };
-    let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(broken)?;
-    let alone = archive.len() == 1;
-    let mut channels = None;
-    let mut sequences = Vec::new();
+    let over = |problem| FileError::OverBudget { path: path.to_owned(), problem };
+    let mut archive = ZipArchive::new(Cursor::new(&*bytes)).map_err(broken)?;
+    let packed = archive.len() as u64;
+    budget.take(archive.len().saturating_mul(256)).map_err(over)?;
+    let (mut arrays, mut texts, mut remarks) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut objects, mut not_numpy) = (None, None);
+    let (mut spent, mut starts) = (0_u64, HashSet::new());
     for index in 0..archive.len() {
         let mut member = archive.by_index(index).map_err(broken)?;
+        spent = spent.saturating_add(member.compressed_size());
+        if spent > bytes.len() as u64 || !starts.insert(member.header_start()) {
+            return Err(FileError::Overlap { path: path.to_owned() });
+        }
         let file_name = member.name().map_err(broken)?.into_owned();
-        let place = format!("{path}, array `{}`", super::excerpt::shortened(&file_name));
-        let wrong = |problem| file_error(&place, problem);
+        let hidden = file_name.starts_with("__MACOSX/")
+            || file_name.rsplit('/').next().is_some_and(|last| last.starts_with("._"));
+        if hidden || member.is_dir() {
+            continue;
+        }
         let mut contents = Vec::new();
-        member.read_to_end(&mut contents).map_err(|error| broken(ZipError::Io(error)))?;
-        let Array { axes, shape: [_, steps, found], values } = parse(&contents).map_err(wrong)?;
-        let needed = *channels.get_or_insert(found);
-        if found != needed {
-            return Err(wrong(ArrayProblem::Channels { found, needed }));
-        }
-        let name = file_name.strip_suffix(".npy").unwrap_or(&file_name);
-        match axes {
-            3 if alone => {
-                let all = values.chunks_exact(steps * found).map(<[f64]>::to_vec);
-                sequences.extend(all.enumerate().map(|(s, values)| ((s + 1).to_string(), values)));
+        // One byte more shows that there is more.
+        let left = budget.left();
+        member.by_ref().take(left + 1).read_to_end(&mut contents).map_err(|error| broken(ZipError::Io(error)))?;
+        budget.take(contents.len()).map_err(over)?;
+        let name = file_name.strip_suffix(".npy").unwrap_or(&file_name).to_owned();
+        let place = format!("{path}, array `{}`", shortened(&file_name));
+        let named = file_name.len() > name.len();
+        match parse(&contents, budget) {
+            Ok(Contents::Arrays(parts)) if parts.len() == 1 && parts[0].name.is_empty() => {
+                arrays.extend(parts.into_iter().map(|array| crate::arrays::Array { name: name.clone(), ..array }));
             }
-            3 => {
-                let found = "of three axes beside other arrays".to_owned();
-                return Err(wrong(ArrayProblem::Shape { found, needed: "steps x channels for each sequence" }));
+            Ok(Contents::Arrays(parts)) => arrays.extend(parts.into_iter().map(|mut array| {
+                array.name = format!("{name}.{}", array.name);
+                array
+            })),
+            Ok(Contents::Texts(all)) => texts.push(Texts { name, texts: all }),
+            Ok(Contents::Other(found)) => {
+                remarks.push(Remark::LeftOut { column: name, what: format!("elements of type {found}") });
+                objects.get_or_insert((place, found));
             }
-            _ => sequences.push((name.to_owned(), values)),
+            Err(_) if !named => {
+                remarks.push(Remark::LeftOut { column: shortened(&file_name), what: "no array".to_owned() });
+                not_numpy.get_or_insert(place);
+            }
+            Err(refused) => return Err(file_error(path, &place, refused)),
         }
+        budget.give_back(contents.len());
     }
-    match channels {
-        Some(channels) => numbered(path, channels, sequences),
-        None => Err(FileError::Empty { path: path.to_owned() }),
+    if arrays.is_empty() {
+        return Err(match (objects, not_numpy) {
+            (Some((place, found)), _) => file_error(path, &place, ArrayProblem::Type { found }.into()),
+            (None, Some(place)) => file_error(path, &place, ArrayProblem::NotNumpy.into()),
+            (None, None) => FileError::Empty { path: path.to_owned() },
+        });
     }
+    budget.take(packed.try_into().unwrap_or(usize::MAX)).map_err(over)?;
+    // What stands side by side is copied.
+    let count = arrays.iter().map(|array| array.values.len()).sum();
+    budget.take_values::<f64>(count).map_err(over)?;
+    let mut samples = to_samples(path, arrays, &texts, selection)?;
+    samples.remarks.extend(remarks);
+    Ok(samples)
 }
 
 /// The bytes of an archive with one array for each sequence of each field: `sequence_000`, ..., `mean_000`, ...

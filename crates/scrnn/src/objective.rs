@@ -97,7 +97,7 @@ pub trait Objective: fmt::Debug + Send + Sync {
     /// initial states that are not learned, are 0.
     ///
     /// What cannot be evaluated is NaN, and learning and recognition take it as they take a value that overflowed: so it is with a run
-    /// that the data do not have, with parameters of another network, and with a device that fails.
+    /// that the data do not have, with parameters or an evaluation of another network, and with a device that fails.
     fn evaluate(&mut self, runs: &[Run], initial: &[f64], want: Want, evaluation: &mut Evaluation);
 
     /// Names the arithmetic: where two names are equal, so are the bits of a training.

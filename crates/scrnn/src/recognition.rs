@@ -270,8 +270,8 @@ struct Problem<'a> {
     learns: Vec<bool>,
 }
 
-/// Bytes of samples and states that columns may take at a time. Every column holds the samples of its sequence side by side with
-/// those of others, so that memory would grow with the number of starts if all ran at once.
+/// Bytes that columns may take at a time: each has states, gradients and moments of its own, and a backend may put the samples of all
+/// runs side by side. Memory would grow with the number of starts if all ran at once.
 const AT_A_TIME: usize = 32 << 20;
 /// Columns that run at once even so: a block of them shares its weights.
 const BLOCK: usize = 6;

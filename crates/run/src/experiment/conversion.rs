@@ -77,7 +77,12 @@ impl Data {
 
     /// Which part of its files is meant.
     pub fn selection(&self) -> Selection {
-        Selection { topic: self.topic.clone(), period: self.period, channels: self.channels.clone() }
+        Selection {
+            topics: self.topic.iter().cloned().collect(),
+            period: self.period,
+            channels: self.channels.clone(),
+            ..Selection::default()
+        }
     }
 
     /// The scaling that the experiment asks for, fitted to `data` if that is asked for.

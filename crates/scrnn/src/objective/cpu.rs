@@ -107,6 +107,11 @@ impl CpuObjective {
         }
     }
 
+    /// Whether parameters, or gradients, are of this network.
+    fn fits(&self, parameters: &Parameters) -> bool {
+        Parameter::ALL.into_iter().all(|block| parameters.block(block).len() == block.range(&self.topology).len())
+    }
+
     /// Whether every run is through samples that are there.
     fn has(&self, runs: &[Run]) -> bool {
         let samples = |run: &Run| self.data.sequences().get(run.sequence).map_or(0, Sequence::len);
@@ -175,8 +180,7 @@ impl CpuObjective {
 
 impl Objective for CpuObjective {
     fn set_parameters(&mut self, parameters: &Parameters) {
-        let fits = |block: Parameter| parameters.block(block).len() == block.range(&self.topology).len();
-        self.fits = Parameter::ALL.into_iter().all(fits);
+        self.fits = self.fits(parameters);
         if self.fits {
             self.packed.fill(parameters);
         }
@@ -184,7 +188,9 @@ impl Objective for CpuObjective {
 
     fn evaluate(&mut self, runs: &[Run], initial: &[f64], want: Want, evaluation: &mut Evaluation) {
         evaluation.resize(runs.len());
-        if !self.fits || !self.has(runs) || initial.len() != runs.len() * self.packed.n_c {
+        let states = runs.len() * self.packed.n_c;
+        let has_room = evaluation.initial.len() == states && self.fits(&evaluation.gradients);
+        if !self.fits || !has_room || !self.has(runs) || initial.len() != states {
             return evaluation.fill_with_nan();
         }
         self.plan(runs, want);

@@ -358,6 +358,9 @@ fn what_cannot_be_evaluated_is_nan() {
         assert!(nan.len() > 40 && nan.iter().all(|value| value.is_nan()));
     }
     assert!(found(parameters, &runs, initial).iter().all(|value| value.is_finite()));
+    let mut of_another = Evaluation::new(&Topology::s_ctrnn(2, 4, 2.0).unwrap());
+    objective.evaluate(&runs, initial, Want::Everything, &mut of_another);
+    assert!(of_another.ln_likelihood.iter().all(|value| value.is_nan()));
     let narrow = Topology::s_ctrnn(1, 5, 2.0).unwrap();
     assert!(Engine::serial().objective(&Request::new(&narrow, &data)).is_err());
 }

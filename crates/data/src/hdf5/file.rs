@@ -1,0 +1,112 @@
+//! Where things are in an HDF5 file: the superblock, addresses, and the way to any of them with bounds.
+//!
+//! Format specification version 3.0 (the HDF Group); roman numerals name its sections.
+
+use crate::budget::Budget;
+use crate::front::Front;
+use crate::problem::FormatProblem;
+
+const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
+/// What messages call such a file.
+pub const KIND: &str = "HDF5";
+
+/// A contradiction, or an end that comes too early.
+pub fn damaged(what: &'static str) -> FormatProblem {
+    FormatProblem::Damaged { kind: KIND, what }
+}
+
+/// A file whose superblock was read.
+#[derive(Debug)]
+pub struct File<'a> {
+    /// From the superblock on: addresses count from there.
+    bytes: &'a [u8],
+    /// Bytes of an address.
+    pub offsets: usize,
+    /// Bytes of a length.
+    pub lengths: usize,
+    /// The root group's header.
+    pub root: u64,
+    /// Whether it is a MATLAB 7.3 file, whose axes stand in reverse.
+    pub is_matlab: bool,
+    /// What may be held and done on behalf of the file.
+    pub budget: &'a Budget,
+}
+
+impl<'a> File<'a> {
+    /// Reads the superblock (II.A), which may stand behind a block of somebody else's.
+    ///
+    /// # Errors
+    /// [`FormatProblem`].
+    pub fn open(bytes: &'a [u8], budget: &'a Budget) -> Result<Self, FormatProblem> {
+        let places = std::iter::once(0).chain((9..31).map(|power| 1_usize << power));
+        let start =
+            places.take_while(|&place| place < bytes.len()).find(|&place| bytes[place..].starts_with(SIGNATURE));
+        let start = start.ok_or(FormatProblem::NotThis { kind: KIND, why: "its signature is nowhere" })?;
+        let is_matlab = start > 0 && bytes.starts_with(b"MATLAB 7.3");
+        let bytes = &bytes[start..];
+        let mut front = Front(&bytes[SIGNATURE.len()..]);
+        let cut = || damaged("the superblock ends early");
+        let version = front.u8().ok_or_else(cut)?;
+        let (offsets, lengths, root) = match version {
+            0 | 1 => {
+                front.take(4).ok_or_else(cut)?;
+                let (offsets, lengths) = front.u8().zip(front.u8()).ok_or_else(cut)?;
+                front.take(if version == 0 { 9 } else { 13 }).ok_or_else(cut)?;
+                // Base, free space, end of file, driver; of the root's entry the name.
+                front.take(5 * usize::from(offsets)).ok_or_else(cut)?;
+                (offsets, lengths, front.number(offsets.into()).ok_or_else(cut)?)
+            }
+            2 | 3 => {
+                let (offsets, lengths) = front.u8().zip(front.u8()).ok_or_else(cut)?;
+                // Flags; base, extension, end of file.
+                front.take(1 + 3 * usize::from(offsets)).ok_or_else(cut)?;
+                (offsets, lengths, front.number(offsets.into()).ok_or_else(cut)?)
+            }
+            _ => return Err(damaged("its superblock is of a version that is not known")),
+        };
+        if !matches!(offsets, 2 | 4 | 8) || !matches!(lengths, 2 | 4 | 8) {
+            return Err(damaged("its addresses have a strange size"));
+        }
+        Ok(Self { bytes, offsets: offsets.into(), lengths: lengths.into(), root, is_matlab, budget })
+    }
+
+    /// What stands from an address on, to the end of the file.
+    pub fn at(&self, address: u64) -> Result<Front<'a>, FormatProblem> {
+        // Each visit costs, so that a small file cannot send its reader round and round.
+        self.budget.take(32)?;
+        let place = usize::try_from(address).ok().and_then(|address| self.bytes.get(address..));
+        place.map(Front).ok_or_else(|| damaged("an address lies outside of the file"))
+    }
+
+    /// `size` bytes from an address on.
+    pub fn bytes(&self, address: u64, size: usize) -> Result<&'a [u8], FormatProblem> {
+        self.at(address)?.take(size).ok_or_else(|| damaged("a part reaches beyond the end of the file"))
+    }
+
+    /// What stands behind a signature at an address.
+    pub fn signed(&self, address: u64, signature: &[u8; 4]) -> Result<Front<'a>, FormatProblem> {
+        let mut front = self.at(address)?;
+        if front.array() == Some(*signature) {
+            Ok(front)
+        } else {
+            Err(damaged("something else stands where an address points to"))
+        }
+    }
+
+    /// An address; None if it is undefined.
+    pub fn address(&self, front: &mut Front<'_>) -> Option<Option<u64>> {
+        let address = front.number(self.offsets)?;
+        let undefined = u64::MAX >> (64 - 8 * self.offsets);
+        Some((address != undefined).then_some(address))
+    }
+
+    /// A length.
+    pub fn length(&self, front: &mut Front<'_>) -> Option<usize> {
+        usize::try_from(front.number(self.lengths)?).ok()
+    }
+}
+
+/// Bytes that numbers up to `limit` take.
+pub fn bytes_for(limit: u64) -> usize {
+    limit.max(1).ilog2() as usize / 8 + 1
+}

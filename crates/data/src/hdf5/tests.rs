@@ -1,0 +1,235 @@
+use std::path::{Path, PathBuf};
+
+use super::*;
+use crate::budget::Budget;
+use crate::{Axes, Reading, inspect_bytes};
+
+/// What tests/python/write_formats.py wrote with h5py. `SCRNN_FIXTURES` can name a folder with all that it writes.
+fn fixture(name: &str) -> Vec<u8> {
+    let all = std::env::var_os("SCRNN_FIXTURES").map(PathBuf::from);
+    let folder = all.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures"));
+    std::fs::read(folder.join("hdf5").join(name)).unwrap()
+}
+
+fn read_with(name: &str, selection: &Selection) -> Result<Reading, FileError> {
+    inspect_bytes(Path::new(if name.ends_with("mat") { "x.mat" } else { "x.hdf5" }), &fixture(name), selection)
+}
+
+fn read(name: &str) -> Reading {
+    read_with(name, &Selection::default()).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+fn arrays(names: &[&str]) -> Selection {
+    Selection { arrays: names.iter().map(|name| (*name).to_owned()).collect(), ..Selection::default() }
+}
+
+/// 16 e + t / 4 + c / 32, as the script has it.
+fn state(e: usize, t: usize, c: usize) -> f64 {
+    16.0 * e as f64 + t as f64 / 4.0 + c as f64 / 32.0
+}
+
+/// Checks demonstrations of 4, 5, 6, ... steps.
+fn check_demos(name: &str, demos: usize) {
+    let reading = read(name);
+    assert_eq!(
+        reading.data.channels(),
+        [
+            "obs/robot0_gripper_qpos.0",
+            "obs/robot0_gripper_qpos.1",
+            "obs/robot0_joint_pos.0",
+            "obs/robot0_joint_pos.1",
+            "obs/robot0_joint_pos.2",
+            "actions.0",
+            "actions.1",
+            "actions.2"
+        ]
+    );
+    assert_eq!(reading.data.sequences().len(), demos, "{name}");
+    for (e, sequence) in reading.data.sequences().iter().enumerate() {
+        assert_eq!((sequence.name.as_str(), sequence.len()), (format!("demo_{e}").as_str(), 4 + e), "{name}");
+        for t in 0..sequence.len() {
+            let row = sequence.sample(t);
+            assert_eq!(row[2..5], [0, 1, 2].map(|c| state(e, t, c)), "{name}");
+            assert_eq!(row[5..], [0, 1, 2].map(|c| -state(e, t, c)), "{name}");
+        }
+    }
+    assert_eq!(reading.period, Some(0.05), "{name}");
+}
+
+#[test]
+fn demonstrations_come_in_natural_order_however_they_were_written() {
+    if std::env::var_os("SCRNN_FIXTURES").is_none() {
+        for name in ["small.hdf5", "small_new.hdf5"] {
+            check_demos(name, 3);
+        }
+        return;
+    }
+    for way in ["", "_new", "_gzip", "_gzip_new", "_grown", "_grown_both", "_one_chunk", "_lzf"] {
+        check_demos(&format!("robomimic{way}.hdf5"), 12);
+    }
+}
+
+#[test]
+fn an_aloha_episode_is_its_joints_and_its_actions() {
+    let reading = read("episode_1.hdf5");
+    let names: Vec<&str> = reading.data.channels().iter().map(String::as_str).collect();
+    assert_eq!(names[..3], ["observations/qpos.0", "observations/qpos.1", "observations/qpos.2"]);
+    assert_eq!(names[3..], ["action.0", "action.1", "action.2"]);
+    let sequence = &reading.data.sequences()[0];
+    assert_eq!((sequence.len(), sequence.sample(8)[4]), (9, -state(1, 8, 1)));
+    let said: Vec<String> = reading.remarks.iter().map(ToString::to_string).collect();
+    assert!(said.iter().any(|remark| remark.contains("there is also observations/qvel")), "{said:?}");
+    let reading = read_with("episode_1.hdf5", &arrays(&["/observations/qvel"])).unwrap();
+    assert_eq!(reading.data.sequences()[0].sample(2)[1], 2.0 * state(1, 2, 1));
+    let channels = Some(vec!["action.2".to_owned(), "observations/qvel.0".to_owned()]);
+    let reading = read_with("episode_1.hdf5", &Selection { channels, ..Selection::default() }).unwrap();
+    assert_eq!(reading.data.sequences()[0].sample(3), [-state(1, 3, 2), 2.0 * state(1, 3, 0)]);
+}
+
+#[test]
+fn numbers_of_every_kind_are_read() {
+    let budget = Budget::of(64 << 20);
+    let bytes = fixture("types.h5");
+    let file = File::open(&bytes, &budget).unwrap();
+    let contents = Contents::read(&file).unwrap();
+    let numbers = |path: &str| {
+        let found = contents.data_sets.iter().find(|found| found.path == path).unwrap();
+        contents.numbers(&file, found).unwrap()
+    };
+    let mut kinds = 0;
+    for found in contents.data_sets.iter().filter(|found| found.path.starts_with("kinds/")) {
+        let unsigned = found.path.contains("_u");
+        let expected: Vec<f64> = match found.path.as_str() {
+            "kinds/bool" => vec![1.0, 0.0, 1.0],
+            _ => (if unsigned { 0 } else { -3 }..4).map(f64::from).collect(),
+        };
+        assert_eq!(numbers(&found.path), expected, "{}", found.path);
+        kinds += 1;
+    }
+    assert_eq!(kinds, 19);
+    assert_eq!(numbers("compact"), [0., 1., 2., 3., 4., 5.]);
+    assert_eq!(numbers("scalar"), [3.0]);
+    assert_eq!(numbers("filled"), [1.0, 2.5, 2.5, 2.5, 2.5, 2.5, 2.5, 2.5, 2.5, 2.5]);
+    assert!(numbers("empty").is_empty());
+    let error = read_with("types.h5", &arrays(&["compound"])).unwrap_err().to_string();
+    assert!(error.contains("compound is 3 records"), "{error}");
+    let error = read_with("types.h5", &arrays(&["nothing"])).unwrap_err();
+    assert!(error.to_string().contains("it has no data set `nothing`"), "{error}");
+    assert!(miette::Diagnostic::help(&error).unwrap().to_string().contains("compact (3 x 2)"));
+    // Data sets of many lengths: nobody can tell which are meant.
+    let error = read("episode_0.hdf5").data.channels().len();
+    assert_eq!(error, 6);
+    assert!(
+        matches!(read_with("types.h5", &Selection::default()), Err(FileError::Format { problem, .. }) if matches!(*problem, FormatProblem::Choose { .. }))
+    );
+}
+
+#[test]
+fn many_groups_and_many_chunks_are_found() {
+    if std::env::var_os("SCRNN_FIXTURES").is_none() {
+        return;
+    }
+    for name in ["many.h5", "many_new.h5"] {
+        let reading = read(name);
+        assert_eq!(reading.data.sequences().len(), 200, "{name}");
+        assert_eq!(reading.data.sequences()[123].sample(2)[1], state(123, 2, 1), "{name}");
+        let long = ["long", "grown", "grown_gzip", "packed", "grown_both", "grown_both_gzip"];
+        for array in if name == "many.h5" { &long[..1] } else { &long[..] } {
+            let reading = read_with(name, &arrays(&[array])).unwrap_or_else(|error| panic!("{name} {array}: {error}"));
+            let sequence = &reading.data.sequences()[0];
+            assert_eq!(sequence.len(), if array.contains("both") { 300 } else { 3000 });
+            for t in 0..sequence.len() {
+                assert_eq!(*sequence.sample(t), [0, 1, 2].map(|c| state(0, t, c)), "{name} {array} {t}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_index_of_chunks_leads_to_them() {
+    let budget = Budget::of(64 << 20);
+    let bytes = fixture("indexes.h5");
+    let file = File::open(&bytes, &budget).unwrap();
+    let contents = Contents::read(&file).unwrap();
+    assert_eq!(contents.data_sets.len(), 11);
+    let expected: Vec<f64> = (0..40).flat_map(|t| (0..3).map(move |c| state(0, t, c))).collect();
+    for found in &contents.data_sets {
+        let numbers = contents.numbers(&file, found).unwrap_or_else(|error| panic!("{}: {error}", found.path));
+        assert_eq!(numbers, expected, "{}", found.path);
+    }
+}
+
+#[test]
+fn axes_are_told_or_asked_for() {
+    let error = read_with("axes.h5", &arrays(&["sideways"])).unwrap_err();
+    let help = miette::Diagnostic::help(&error).unwrap().to_string();
+    assert!(help.contains("axes = \"ct\""), "{error}: {help}");
+    let axes = |axes: &str| Selection { axes: Some(axes.parse::<Axes>().unwrap()), ..arrays(&["sideways"]) };
+    let reading = read_with("axes.h5", &axes("ct")).unwrap();
+    assert_eq!((reading.data.channels().len(), reading.data.sequences()[0].len()), (3, 20));
+    assert_eq!(reading.data.sequences()[0].sample(7), [0, 1, 2].map(|c| state(0, 7, c)));
+    let reading = read_with("axes.h5", &arrays(&["block"])).unwrap();
+    assert_eq!((reading.data.sequences().len(), reading.data.channels().len()), (2, 3));
+    assert_eq!(reading.data.sequences()[1].sample(4)[2], state(1, 4, 2));
+}
+
+#[test]
+fn flags_of_the_last_step_tell_episodes_apart() {
+    let reading = read("flags.h5");
+    assert_eq!(reading.data.sequences().iter().map(|one| one.len()).collect::<Vec<_>>(), [4, 6, 2]);
+    assert_eq!(reading.data.channels().len(), 6);
+}
+
+#[test]
+fn a_matlab_file_has_its_axes_in_reverse() {
+    let reading = read("matlab.mat");
+    assert_eq!(reading.data.channels(), ["q.0", "q.1", "q.2"]);
+    assert_eq!(reading.data.sequences()[0].sample(9), [0, 1, 2].map(|c| state(0, 9, c)));
+}
+
+/// Reads all that is there.
+fn read_all(bytes: &[u8]) -> Option<usize> {
+    let budget = Budget::of(16 << 20);
+    let file = File::open(bytes, &budget).ok()?;
+    let contents = Contents::read(&file).ok()?;
+    let _ = layout::samples(&file, &contents, &Selection::default());
+    Some(contents.data_sets.iter().filter(|found| contents.numbers(&file, found).is_ok()).count())
+}
+
+#[test]
+fn damaged_bytes_never_panic() {
+    let runs = std::env::var("SCRNN_FLIPS").ok().and_then(|runs| runs.parse().ok()).unwrap_or(300);
+    let all = ["robomimic_grown_both.hdf5", "robomimic_gzip.hdf5", "many_new.h5"];
+    let names = ["small.hdf5", "small_new.hdf5", "types.h5", "flags.h5", "indexes.h5"];
+    let all = if std::env::var_os("SCRNN_FIXTURES").is_some() { &all[..] } else { &[] };
+    for name in names.iter().chain(all) {
+        let bytes = fixture(name);
+        assert!(read_all(&bytes).is_some_and(|count| count > 0), "{name}");
+        let mut random = crate::tests_random::Random(7);
+        for _ in 0..runs {
+            let mut damaged = bytes.clone();
+            for _ in 0..=random.below(3) {
+                let place = random.below(damaged.len());
+                damaged[place] = random.below(256) as u8;
+            }
+            read_all(&damaged);
+        }
+        for part in 0..100 {
+            read_all(&bytes[..bytes.len() * part / 100]);
+        }
+    }
+}
+
+#[test]
+fn demo_2_comes_before_demo_10() {
+    let case = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases/28-robomimic-hdf5/demo.hdf5");
+    let reading = crate::inspect(&case, &Selection::default()).unwrap();
+    let names: Vec<String> = reading.data.sequences().iter().map(|one| one.name.clone()).collect();
+    assert_eq!(names, (0..12).map(|demo| format!("demo_{demo}")).collect::<Vec<_>>());
+    assert!(reading.data.sequences().iter().all(|one| one.len() == 40));
+    assert_eq!((reading.data.channels().len(), reading.data.channels()[7].as_str()), (9, "actions.0"));
+    // Of demo_10, as h5py reads it.
+    let sample = reading.data.sequences()[10].sample(3);
+    assert_eq!(sample[..2], [-0.446_506_249_861_436_94, -0.085_805_176_156_179_69]);
+    assert_eq!(sample[7..], [-0.426_946_282_847_032_23, -0.069_619_550_337_053_6]);
+}

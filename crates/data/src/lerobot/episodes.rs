@@ -1,0 +1,162 @@
+//! Frames sorted into episodes.
+
+use std::collections::BTreeMap;
+
+use super::plan::Plan;
+use crate::budget::Budget;
+use crate::parquet::{Cells, Parquet};
+use crate::problem::FormatProblem;
+use crate::samples::Track;
+
+/// The frames that were read so far, by episode.
+#[derive(Debug, Default)]
+pub struct Episodes {
+    all: BTreeMap<i64, Episode>,
+}
+
+#[derive(Debug, Default)]
+struct Episode {
+    values: Vec<f64>,
+    /// Numbers of the frames; empty if nothing counts them.
+    frames: Vec<i64>,
+    /// Nanoseconds; empty if they are not needed.
+    times: Vec<i64>,
+}
+
+impl Episodes {
+    /// Takes all frames of a file.
+    pub fn take(&mut self, file: &Parquet<'_>, plan: &Plan, budget: &Budget) -> Result<(), FormatProblem> {
+        let leaf = |name: &str| {
+            let leaf = file.leaf(name).filter(|&leaf| file.leaves[leaf].is_numeric());
+            leaf.ok_or_else(|| FormatProblem::NoSuch {
+                what: "column of numbers",
+                found: name.to_owned(),
+                there: file.leaves.iter().map(|leaf| leaf.name.as_str()).collect::<Vec<_>>().join(", "),
+            })
+        };
+        let one = |name: Option<&String>| name.map(|name| leaf(name)).transpose();
+        let (episode, frame) = (one(plan.episode.as_ref())?, one(plan.frame.as_ref())?);
+        let clock = one(plan.clock.as_ref().map(|(name, _)| name))?;
+        let per_second = plan.clock.as_ref().map_or(1.0, |(_, per_second)| *per_second);
+        let features = plan.taken().map(|feature| leaf(&feature.name)).collect::<Result<Vec<_>, _>>()?;
+        let widths: Vec<usize> = plan.taken().map(|feature| feature.width).collect();
+        for group in 0..file.groups() {
+            let cells = |leaf: Option<usize>| leaf.map(|leaf| file.cells(group, leaf, budget)).transpose();
+            let (episode, frame) = (cells(episode)?, cells(frame)?);
+            let clock = cells(clock)?.map(|cells| (cells, per_second));
+            let features =
+                features.iter().map(|&leaf| file.cells(group, leaf, budget)).collect::<Result<Vec<_>, _>>()?;
+            let rows = file.rows(group)?;
+            budget.take_values::<f64>(rows.saturating_mul(plan.channels.len() + 2))?;
+            self.take_rows(rows, episode.as_ref(), frame.as_ref(), clock.as_ref(), &features, &widths, plan)?;
+            for cells in [episode, frame, clock.map(|(cells, _)| cells)].into_iter().flatten().chain(features) {
+                budget.give_back(cells.taken());
+            }
+        }
+        Ok(())
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "the columns of one group of rows, each of its own kind")]
+    fn take_rows(
+        &mut self,
+        rows: usize,
+        episode: Option<&Cells>,
+        frame: Option<&Cells>,
+        clock: Option<&(Cells, f64)>,
+        features: &[Cells],
+        widths: &[usize],
+        plan: &Plan,
+    ) -> Result<(), FormatProblem> {
+        let whole = |cells: &Cells, row: usize, name: Option<&String>| match *cells.row(row) {
+            [value] if value.is_finite() => Ok(value as i64),
+            _ => Err(FormatProblem::Misfit {
+                found: format!("row {} has no value of {}", row + 1, name.map_or("", String::as_str)),
+                needed: "one in each row".to_owned(),
+            }),
+        };
+        let mut row = 0;
+        while row < rows {
+            // Rows of one episode stand together.
+            let number = episode.map_or(Ok(0), |cells| whole(cells, row, plan.episode.as_ref()))?;
+            let into = self.all.entry(number).or_default();
+            while row < rows {
+                if let Some(cells) = episode
+                    && whole(cells, row, plan.episode.as_ref())? != number
+                {
+                    break;
+                }
+                for ((cells, &width), feature) in features.iter().zip(widths).zip(plan.taken()) {
+                    match cells.row(row) {
+                        [] => into.values.extend(std::iter::repeat_n(f64::NAN, width)),
+                        values if values.len() == width => into.values.extend(values),
+                        values => {
+                            return Err(FormatProblem::Misfit {
+                                found: format!("row {} has {} values of {}", row + 1, values.len(), feature.name),
+                                needed: format!("{width}, as the first row has"),
+                            });
+                        }
+                    }
+                }
+                if let Some(cells) = frame {
+                    into.frames.push(whole(cells, row, plan.frame.as_ref())?);
+                }
+                if let Some((cells, per_second)) = clock {
+                    let missing = || FormatProblem::Misfit {
+                        found: format!("row {} has no time", row + 1),
+                        needed: "one in each row".to_owned(),
+                    };
+                    let value = cells.row(row).first().filter(|value| value.is_finite()).ok_or_else(missing)?;
+                    into.times.push((value / per_second * 1e9).round() as i64);
+                }
+                row += 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// How many episodes and frames there are.
+    pub fn counts(&self) -> (usize, usize) {
+        (self.all.len(), self.all.values().map(|episode| episode.frames.len()).sum())
+    }
+
+    /// The episodes in their order, each with its frames in theirs.
+    pub fn tracks(self, labelled: bool, channels: usize) -> Result<Vec<Track>, FormatProblem> {
+        let track = |(number, mut episode): (i64, Episode)| {
+            let name = if labelled { number.to_string() } else { "1".to_owned() };
+            episode.sort(channels);
+            if let Some(pair) = episode.frames.windows(2).find(|pair| pair[0] == pair[1]) {
+                return Err(FormatProblem::Misfit {
+                    found: format!("frame {} of episode {name} comes twice", pair[0]),
+                    needed: "each frame once".to_owned(),
+                });
+            }
+            if let Some(pair) = episode.frames.windows(2).find(|pair| pair[1] - pair[0] > 1)
+                && episode.times.is_empty()
+            {
+                return Err(FormatProblem::Misfit {
+                    found: format!("episode {name} lacks the frames between {} and {}", pair[0], pair[1]),
+                    needed: "all frames, as steps are equally spaced".to_owned(),
+                });
+            }
+            Ok(Track { name, values: episode.values, times: episode.times })
+        };
+        self.all.into_iter().map(track).collect()
+    }
+}
+
+impl Episode {
+    /// Brings frames that stand in another order into the order of their numbers.
+    fn sort(&mut self, channels: usize) {
+        if self.frames.is_sorted() || channels == 0 {
+            return;
+        }
+        let mut order: Vec<usize> = (0..self.frames.len()).collect();
+        order.sort_by_key(|&row| self.frames[row]);
+        let values = order.iter().flat_map(|&row| &self.values[row * channels..(row + 1) * channels]);
+        self.values = values.copied().collect();
+        if !self.times.is_empty() {
+            self.times = order.iter().map(|&row| self.times[row]).collect();
+        }
+        self.frames = order.iter().map(|&row| self.frames[row]).collect();
+    }
+}
