@@ -1,15 +1,12 @@
 //! Where an experiment's sequences come from: a task, which knows the truth, or files.
 
-use std::path::Path;
-
 use scrnn::dataset::Dataset;
 use scrnn_sim::tutor::{self, Demonstration, Tutoring};
 use sha2::{Digest, Sha256};
 
-use crate::channels;
 use crate::experiment::Data;
 use crate::failure::{Failure, Result};
-use scrnn_data as files;
+use scrnn_data::{Reading, Remark, read_all, suspicions};
 use scrnn_tasks::{Task, TaskName, make};
 
 /// Sequences in their own units.
@@ -19,13 +16,17 @@ pub struct Source {
     pub data: Dataset,
     /// The variance of each sample's noise, where it is known.
     pub truth: Option<Truth>,
+    /// Seconds between two samples, where that is known.
+    pub period: Option<f64>,
+    /// What is worth saying about files that were read, what looks wrong among it.
+    pub remarks: Vec<Remark>,
     /// What came of the movements that a robot was taught; empty where none was.
     pub demonstrations: Vec<Demonstration>,
 }
 
 impl Source {
     fn of(data: Dataset) -> Self {
-        Self { data, truth: None, demonstrations: Vec::new() }
+        Self { data, truth: None, period: None, remarks: Vec::new(), demonstrations: Vec::new() }
     }
 }
 
@@ -60,49 +61,14 @@ pub fn load(data: &Data, threads: usize) -> Result<Source> {
         let truth = (!task.has_robot()).then_some(Truth { task, variances });
         return Ok(Source { truth, ..Source::of(data) });
     }
-    let paths = data.files.as_deref().unwrap_or_default();
-    let mut sets = Vec::with_capacity(paths.len());
-    for path in paths {
-        sets.push((path, files::read_part(path, &data.selection())?));
+    let files = data.files.as_deref().unwrap_or_default();
+    if files.is_empty() {
+        return Err(Failure::input("the experiment names no file", "add one to `data.files`"));
     }
-    let data = match sets.as_slice() {
-        [(_, only)] => only.clone(),
-        several => {
-            let (first, channels) = match several.first() {
-                Some((path, set)) => (path.display().to_string(), set.channels().to_vec()),
-                None => return Err(Failure::input("the experiment names no file", "add one to `data.files`")),
-            };
-            let mut sequences = Vec::new();
-            for (path, set) in sets {
-                let set = alike(set, &channels, (path, &first))?;
-                let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-                for sequence in set.sequences() {
-                    let mut sequence = sequence.clone();
-                    sequence.name = format!("{stem}/{}", sequence.name);
-                    sequences.push(sequence);
-                }
-            }
-            Dataset::new(channels, sequences)?
-        }
-    };
-    Ok(Source::of(data))
-}
-
-/// `set`, from the file at `path`, on the channels of the first file: by their names, whatever their order.
-fn alike(set: Dataset, channels: &[String], (path, first): (&Path, &str)) -> Result<Dataset> {
-    if set.channels() == channels {
-        return Ok(set);
-    }
-    if channels::nameless(set.channels()) || channels::by_name(set.channels(), channels).is_err() {
-        let message = format!(
-            "the channels of {} are {}, those of {first} are {}",
-            path.display(),
-            set.channels().join(", "),
-            channels.join(", ")
-        );
-        return Err(Failure::input(message, "files that are learned together need the same channels, by name"));
-    }
-    channels::matched(set, channels, &path.display().to_string())
+    let Reading { data, period, mut remarks, .. } = read_all(files, &data.selection())?;
+    let suspicions = suspicions::look(&data).into_iter();
+    remarks.extend(suspicions.map(|suspicion| Remark::Suspicion { suspicion }));
+    Ok(Source { period, remarks, ..Source::of(data) })
 }
 
 /// How the robot is taught: so many demonstrations of so many samples.

@@ -8,6 +8,7 @@ use scrnn::initialization::initialize;
 use scrnn::learning::{Learner, Outcome};
 use scrnn::scaling::Scaling;
 use scrnn::topology::Topology;
+use scrnn_data::Level;
 
 use crate::experiment::Experiment;
 use crate::failure::{Failure, Result};
@@ -65,6 +66,9 @@ pub fn train(
     messages: &dyn Messages,
 ) -> Result<Training> {
     let source = source::load(&experiment.data, engine.threads())?;
+    if experiment.data.files.is_some() {
+        introduce(experiment, &source, messages);
+    }
     let topology = experiment.topology(source.data.channels().len())?;
     source.data.check_for(&topology)?;
     refuse_unbounded(&source.data, &topology)?;
@@ -125,6 +129,31 @@ pub fn train(
     let (score, best, seconds) = (recorder.score_of(learner.epoch()), recorder.best(), recorder.seconds());
     let run = run.path().display().to_string();
     Ok(Training { run, outcome, learner, source, scaling, score, best, seconds })
+}
+
+/// Says what is learned, and what looks wrong in it, before anything is learned.
+fn introduce(experiment: &Experiment, source: &Source, messages: &dyn Messages) {
+    let data = &source.data;
+    let lengths = || data.sequences().iter().map(|sequence| sequence.len());
+    let (shortest, longest) = (lengths().min().unwrap_or(0), lengths().max().unwrap_or(0));
+    let count = data.sequences().len();
+    let mut line = format!("learns {count} sequence{}", if count == 1 { "" } else { "s" });
+    line += &match shortest == longest {
+        true => format!(" of {longest} samples"),
+        false => format!(" of {shortest} to {longest} samples"),
+    };
+    if let Some(period) = source.period {
+        line += &format!(", {} Hz", (1e3 / period).round() / 1e3);
+    }
+    let files = experiment.data.files.as_deref().unwrap_or_default();
+    let names = files.iter().map(|file| file.file_name().unwrap_or_default().to_string_lossy().into_owned());
+    let names = names.collect::<Vec<_>>().join(", ");
+    messages.say(&format!("{line}, channels: {} (from {names})", data.channels().join(", ")));
+    for remark in &source.remarks {
+        let kind = if remark.level() == Level::Warning { "warning" } else { "note" };
+        let help = remark.help().map_or(String::new(), |help| format!(" ({help})"));
+        messages.say(&format!("{kind}: {remark}{help}"));
+    }
 }
 
 /// Channels whose predicted samples are all the same.

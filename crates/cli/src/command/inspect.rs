@@ -9,7 +9,8 @@ use serde_json::{Value, json};
 
 use crate::args::{Part, Shared};
 use crate::output;
-use scrnn_data as files;
+use scrnn_data::{self as files, Level, Reading, Remark};
+use scrnn_run::run_folder::CHECKPOINT;
 use scrnn_report::Table;
 use scrnn_run::failure::{Ending, Result};
 use scrnn_run::notes::Score;
@@ -36,12 +37,15 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     let path = &arguments.path;
     let is_checkpoint = path.extension().is_some_and(|extension| extension == "safetensors");
-    let (object, text) = if path.is_dir() || is_checkpoint {
+    let is_run = path.is_dir() && path.join(CHECKPOINT).exists();
+    let (object, text) = if is_run || is_checkpoint {
         let trained = Trained::open(path, false)?;
         (network_object(&trained), network_text(&trained, path))
     } else {
-        let data = files::read_part(path, &arguments.part.of(path, None))?;
-        (data_object(&data), data_text(&data, path))
+        let mut reading = files::read_all(&[path], &arguments.part.of(path, None))?;
+        let suspicions = files::suspicions::look(&reading.data).into_iter();
+        reading.remarks.extend(suspicions.map(|suspicion| Remark::Suspicion { suspicion }));
+        (reading_object(&reading), reading_text(&reading, path))
     };
     if arguments.json {
         let mut object = object;
@@ -154,6 +158,38 @@ fn told(score: Score) -> String {
         Some(nll) => format!("nll {nll:.4} nats per step and channel, mse {:.4e}", score.mse),
         None => format!("mse {:.4e} per step and channel", score.mse),
     }
+}
+
+fn reading_object(reading: &Reading) -> Value {
+    let mut object = data_object(&reading.data);
+    object["period"] = json!(reading.period);
+    object["remarks"] = reading.remarks.iter().map(Remark::json).collect();
+    object["facts"] = json!(reading.facts);
+    object
+}
+
+/// The data, then what is known of the file, then what is worth saying.
+fn reading_text(reading: &Reading, path: &Path) -> String {
+    let mut text = data_text(&reading.data, path);
+    text += &format!("format: {}\n", reading.facts.format);
+    if let Some(period) = reading.period {
+        let clock = reading.facts.clock.as_ref().map_or(String::new(), |clock| format!(", by {clock}"));
+        text += &format!("a sample every {period} s ({} Hz){clock}\n", (1e3 / period).round() / 1e3);
+    }
+    for topic in &reading.facts.topics {
+        let taken = if topic.taken { "taken" } else { "not taken" };
+        let rate = topic.rate.map_or(String::new(), |rate| format!(", {} Hz", (1e3 * rate).round() / 1e3));
+        text += &format!("  {} ({}): {}{rate}, {taken}\n", topic.name, topic.of, topic.count);
+    }
+    for gap in &reading.facts.gaps {
+        text += &format!("gap in {} after sample {}: {} s\n", gap.sequence, gap.after, gap.seconds);
+    }
+    for remark in &reading.remarks {
+        let kind = if remark.level() == Level::Warning { "warning" } else { "note" };
+        let help = remark.help().map_or(String::new(), |help| format!(" ({help})"));
+        text += &format!("{kind}: {remark}{help}\n");
+    }
+    text
 }
 
 fn data_object(data: &Dataset) -> Value {

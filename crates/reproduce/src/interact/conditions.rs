@@ -95,16 +95,9 @@ impl Setting {
         }
         experiment.name = format!("{}_{}", experiment.name, self.condition.key.replace('-', "_"));
         experiment.data = Data {
-            task: None,
-            sequences: None,
-            steps: None,
-            seed: None,
-            exact_positions: None,
             files: Some(vec![self.file().into()]),
-            topic: None,
-            period: None,
-            channels: None,
             scaling: Some(ScalingChoice::Named(ScalingName::Fit)),
+            ..Data::default()
         };
         Ok(experiment.resolved(folder)?)
     }

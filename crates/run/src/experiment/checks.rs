@@ -75,6 +75,11 @@ fn check_data(data: &Data) -> Check {
         (Some(_), None) => {
             let of_files = [
                 ("topic", data.topic.is_some()),
+                ("topics", data.topics.is_some()),
+                ("time", data.time.is_some()),
+                ("arrays", data.arrays.is_some()),
+                ("axes", data.axes.is_some()),
+                ("unwrap", data.unwrap.is_some()),
                 ("period", data.period.is_some()),
                 ("channels", data.channels.is_some()),
             ];
@@ -84,6 +89,11 @@ fn check_data(data: &Data) -> Check {
                 }
             }
         }
+    }
+    if let Some(axes) = &data.axes
+        && let Err(message) = axes.parse::<scrnn_data::Axes>()
+    {
+        return complaint(&["data", "axes"], message, "one letter for each axis, as \"nct\" or \"tc\"");
     }
     if let Some(period) = data.period {
         positive(&["data", "period"], period)?;

@@ -8,10 +8,10 @@ use scrnn::scaling::Scaling;
 use scrnn::topology::{Prediction, Topology};
 
 use super::{
-    Data, Experiment, OptimiserName, ScalingChoice, ScalingConstants, ScalingName, ScalingRanges, TaskName, Training,
+    Data, Experiment, OptimiserName, ScalingChoice, ScalingConstants, ScalingName, ScalingRanges, TaskName, TimeSourceName, Training,
 };
 use crate::failure::{Failure, Result};
-use scrnn_data::Selection;
+use scrnn_data::{Selection, TimeSource};
 
 impl Experiment {
     /// The same experiment with every value explicit. `folder` is where its file lies.
@@ -77,10 +77,21 @@ impl Data {
 
     /// Which part of its files is meant.
     pub fn selection(&self) -> Selection {
+        let mut topics = self.topics.clone().unwrap_or_default();
+        topics.extend(self.topic.iter().filter(|topic| !topics.contains(topic)).cloned().collect::<Vec<_>>());
         Selection {
-            topics: self.topic.iter().cloned().collect(),
+            topics,
             period: self.period,
+            time: self.time.map(|time| match time {
+                TimeSourceName::Header => TimeSource::Header,
+                TimeSourceName::Publish => TimeSource::Publish,
+                TimeSourceName::Log => TimeSource::Log,
+                TimeSourceName::Rows => TimeSource::Rows,
+            }),
             channels: self.channels.clone(),
+            arrays: self.arrays.clone().unwrap_or_default(),
+            axes: self.axes.as_ref().and_then(|axes| axes.parse().ok()),
+            unwrap: self.unwrap.clone().unwrap_or_default(),
             ..Selection::default()
         }
     }

@@ -49,7 +49,7 @@ fn one() -> u64 {
 }
 
 /// The sequences to learn: either a task of the thesis or files.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Data {
     /// A task of the thesis. Its data are made anew for each run, the same for the same seed.
@@ -68,13 +68,29 @@ pub struct Data {
     /// off for each sequence. Default false.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exact_positions: Option<bool>,
-    /// Files to read, relative to the experiment file: .csv, .txt, .npy, .npz or .mcap. The sequences of all of them are
-    /// learned together.
+    /// Files and folders to read, relative to the experiment file; `*` stands for any part of a name. The sequences of all of
+    /// them are learned together.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub files: Option<Vec<PathBuf>>,
-    /// The topic whose messages are samples, in .mcap files. Default: /sensed, or the only one whose messages are JSON.
+    /// The topic whose messages are samples, in recordings. Default: /sensed, or the only one that can be meant.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub topic: Option<String>,
+    /// Topics of a recording that are joined, each brought to `period`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub topics: Option<Vec<String>>,
+    /// What tells when a sample was taken: "header", "publish" or "log" in recordings; "rows" takes rows as even steps whatever
+    /// their clock says. Default: the best there is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time: Option<TimeSourceName>,
+    /// Arrays or data sets of a file that holds several, by name or path, in this order. Default: the reader chooses.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub arrays: Option<Vec<String>>,
+    /// What the axes of an array are, a letter for each: n sequences, t steps, c channels, e.g. "nct".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axes: Option<String>,
+    /// Channels that are angles: their jumps of a whole turn are taken out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unwrap: Option<Vec<String>>,
     /// Seconds between samples, to which the messages of .mcap files are brought. Default: as they are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub period: Option<f64>,
@@ -85,6 +101,20 @@ pub struct Data {
     /// "none" for other tasks.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scaling: Option<ScalingChoice>,
+}
+
+/// What tells when a sample was taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum TimeSourceName {
+    /// The stamp inside of a message.
+    Header,
+    /// When a message was published.
+    Publish,
+    /// When a message was logged.
+    Log,
+    /// Nothing: rows and messages are steps.
+    Rows,
 }
 
 /// How samples are scaled.
