@@ -2,7 +2,7 @@
 
 use scrnn::analysis::clustering::Clustering;
 
-use super::Findings;
+use super::findings::Findings;
 use crate::framework::{JobResult, Measure, Verdict};
 
 /// What is compared with the thesis and over seeds; `twelve` says whether these are the twelve that are also recognised.

@@ -1,10 +1,11 @@
 //! Curves with noise of constant variance, each its own: the twelve of 3.2, and the 144 patterns of 6.2.3.
 
+mod findings;
 mod goals;
 mod page;
 mod recognition;
 
-use scrnn::analysis::clustering::{self, Clustering};
+use scrnn::analysis::clustering;
 use scrnn::analysis::principal_components::PrincipalComponents;
 use scrnn::dataset::Dataset;
 use scrnn::evaluation::{half_mean_squared_error, mean_and_deviation, success_bound};
@@ -14,16 +15,14 @@ use scrnn_report::Section;
 use scrnn_run::assessment::{self, Assessment, Predictions};
 use scrnn_tasks::lissajous::PERIOD;
 use scrnn_tasks::{TaskName, make};
-use serde::Serialize;
 
 use crate::framework::preset::asset;
 use crate::framework::{
     CLOSED_LOOP, Condition, Desk, HELD_OUT, Job, Kind, Learned, Measure, Result, Results, Study, Verdict,
 };
-use recognition::recognition;
+use findings::{Ctrnn, Findings, Material, Pattern, Recognised};
+use recognition::{STEPS, recognition};
 
-/// Steps of each closed loop (3.2.3).
-const STEPS: usize = 1000;
 /// Random orders of the labels that clustering is compared with.
 const SHUFFLES: usize = 9999;
 
@@ -60,94 +59,6 @@ pub const LISSAJOUS: Curves = Curves {
 /// The 144 patterns.
 pub const PATTERNS: Curves =
     Curves { title: "144 fluctuating patterns", networks: &[MANY], task: TaskName::Patterns, recognition: false };
-
-/// The figures of one seed.
-#[derive(Debug, Serialize)]
-pub struct Findings {
-    /// Each pattern.
-    pub patterns: Vec<Pattern>,
-    /// How many the closed loop with noise regenerates.
-    pub regenerated: usize,
-    /// |mean predicted variance - true| / true, averaged over patterns and channels (3.4).
-    pub variance_error_mean: f64,
-    /// The largest of these.
-    pub variance_error_max: f64,
-    /// The CTRNN, where there is one.
-    pub ctrnn: Option<Ctrnn>,
-    /// Recognition, where it was tried.
-    pub recognition: Option<Recognised>,
-    /// Initial states by their noise, in the plane of the first two components.
-    pub clustering_plane: Option<Clustering>,
-    /// In all dimensions.
-    pub clustering_all: Option<Clustering>,
-    /// Share of the initial states' variance in that plane.
-    pub plane_share: f64,
-    /// One step ahead.
-    pub assessment: Assessment,
-}
-
-/// One pattern.
-#[derive(Debug, Serialize)]
-pub struct Pattern {
-    /// From 1, as in the thesis.
-    pub number: usize,
-    /// The variance of its noise.
-    pub true_variance: f64,
-    /// Predicted variance of each channel in the closed loop, averaged over steps (3.4).
-    pub mean_variance: Vec<f64>,
-    /// Its standard deviation over steps.
-    pub variance_deviation: Vec<f64>,
-    /// (3.5) in the closed loop with noise, against the ideal curve.
-    pub error: f64,
-    /// The most it may be (3.2.5).
-    pub bound: f64,
-    /// Whether it is within the bound.
-    pub regenerated: bool,
-    /// (3.5) against the ideal curve at the phase that suits best: small where only the phase is off.
-    pub error_at_best_phase: f64,
-    /// Of the trials of recognition, those from whose state the closed loop regenerates the pattern.
-    pub recognised: Option<usize>,
-    /// Those that are within the bound while the network listens.
-    pub recognised_listening: Option<usize>,
-}
-
-/// The CTRNN in the closed loop.
-#[derive(Debug, Serialize)]
-pub struct Ctrnn {
-    /// How many patterns it regenerates.
-    pub regenerated: usize,
-    /// Those it does not, from 1.
-    pub failed: Vec<usize>,
-    /// (3.5) of each.
-    pub errors: Vec<f64>,
-}
-
-/// Recognition of all patterns.
-#[derive(Debug, Serialize)]
-pub struct Recognised {
-    /// Starts, over all patterns.
-    pub trials: usize,
-    /// From whose state the closed loop regenerates the pattern (3.2.5).
-    pub succeeded: usize,
-    /// Within the same bound while the network listens.
-    pub succeeded_listening: usize,
-}
-
-/// What figures are drawn from.
-pub struct Material {
-    /// The sequences that were learned.
-    pub data: Dataset,
-    /// The closed loop with noise.
-    pub closed: Vec<Generated>,
-    /// The CTRNN's closed loop.
-    pub ctrnn: Option<Vec<Generated>>,
-    /// Context units.
-    pub units: usize,
-    /// Initial states in the plane.
-    pub plane: Vec<f64>,
-    /// Level of noise of each pattern, from 0.
-    pub levels: Vec<usize>,
-}
 
 impl Study for Curves {
     type Findings = Findings;

@@ -3,11 +3,11 @@
 use scrnn::analysis::clustering::Clustering;
 use scrnn::generation::Generated;
 
-use super::{Findings, Material};
+use super::findings::{Findings, Material};
 use crate::framework::JobResult;
-use crate::framework::shapes::two_units;
+use crate::framework::shapes::{figure, two_units};
 use scrnn_pages::calibration_blocks;
-use scrnn_report::{Block, Chart, Figure, Mark, Panel, Section, Series, Sheet, Tone};
+use scrnn_report::{Block, Chart, Mark, Panel, Section, Series, Sheet, Tone};
 
 /// The thesis' Table 3.1: mean and standard deviation of the predicted variance of both channels.
 const TABLE_3_1: [[f64; 4]; 12] = [
@@ -59,11 +59,6 @@ fn phase_plots<'a>(
         .collect();
     let columns = if panels.len() > 12 { 12 } else { 4 };
     Chart { columns, aspect: 1.0, x_label: String::new(), y_label: String::new(), panels }
-}
-
-fn figure(file: &str, title: &str, caption: &str, thesis: &str, chart: Chart) -> Block {
-    let [file, title, caption, thesis] = [file, title, caption, thesis].map(str::to_owned);
-    Block::Figure(Box::new(Figure { file, title, caption, thesis, drawing: chart.into() }))
 }
 
 /// Steps of a phase plot: many panels have room for few.

@@ -6,9 +6,10 @@ use scrnn::generation::{Feedback, GenerationOptions, Start, generate};
 use scrnn::recognition::{RecognitionOptions, WarmStart, recognize};
 use scrnn_tasks::lissajous::PERIOD;
 
-use super::STEPS;
 use crate::framework::{CLOSED_LOOP, Desk, Learned, Result};
 
+/// Steps of each closed loop (3.2.3).
+pub const STEPS: usize = 1000;
 /// Samples of a pattern that recognition looks at: five periods. In the open loop u_0 is forgotten after some tens of
 /// steps, so that later samples say nothing about it, and only make the ascent slower.
 const OBSERVED: usize = 5 * PERIOD;

@@ -13,16 +13,18 @@ use scrnn_run::history;
 use scrnn_run::run_folder::{CHECKPOINT, HISTORY, RunFolder};
 use scrnn_run::training::{Found, Training, train};
 
+use super::condition::Condition;
 use super::context::Context;
 use super::desk::Desk;
+use super::job_result::{JobResult, TrainingFacts};
 use super::kept::{Decides, EVALUATION, Kept};
 use super::measure::{Measure, Summary};
 use super::metrics::{METRICS, Machine, Metrics};
 use super::options::{Options, Reproduced};
 use super::preset::Kind;
-use super::results::{JobResult, Results, TrainingFacts};
+use super::results::Results;
 use super::stop::{Result, Stop};
-use super::study::{Condition, Job, Learned, Study};
+use super::study::{Job, Learned, Study};
 use super::{overview, told};
 
 /// One job and what it came to.

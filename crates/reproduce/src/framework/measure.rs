@@ -3,7 +3,7 @@
 use scrnn::evaluation::mean_and_deviation;
 use serde::Serialize;
 
-use super::results::JobResult;
+use super::job_result::JobResult;
 
 /// A number that is compared.
 pub struct Measure<F> {

@@ -5,8 +5,9 @@ use scrnn_run::experiment::Experiment;
 use serde::Serialize;
 
 use super::comparison::Compared;
+use super::job_result::JobResult;
 use super::measure::Summary;
-use super::results::{JobResult, Results};
+use super::results::Results;
 use super::table::{self, Table};
 use super::verdict::Verdict;
 

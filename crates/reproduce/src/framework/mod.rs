@@ -8,19 +8,22 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`study`] | the trait, a job, a trained network |
+//! | [`study`], [`condition`] | the trait, a job, a trained network; under which circumstances networks learn |
 //! | [`preset`] | the experiment files of a study's networks |
 //! | [`driver`] | from options to a page |
 //! | [`desk`], [`kept`] | what an evaluation is given; parts of evaluations in files |
-//! | [`results`] | what the jobs came to |
+//! | [`job_result`], [`results`] | what one job came to, and all of them |
 //! | [`measure`], [`comparison`], [`verdict`], [`table`] | what is made of it |
+//! | [`shapes`] | what figures of several studies are made from |
 //! | [`metrics`], [`told`], [`overview`] | how it is told: as JSON, as text, as a page |
 //! | [`options`], [`context`], [`stop`] | what a reproduction is asked and given, and how it ends early |
 
 pub mod comparison;
+pub mod condition;
 pub mod context;
 pub mod desk;
 pub mod driver;
+pub mod job_result;
 pub mod kept;
 pub mod measure;
 pub mod metrics;
@@ -38,13 +41,15 @@ pub mod told;
 pub mod verdict;
 
 pub use comparison::Comparison;
+pub use condition::Condition;
 pub use desk::Desk;
 pub use driver::reproduce;
+pub use job_result::JobResult;
 pub use measure::{Measure, Summary};
 pub use preset::Kind;
-pub use results::{JobResult, Results};
+pub use results::Results;
 pub use stop::Result;
-pub use study::{Condition, Job, Learned, Study};
+pub use study::{Job, Learned, Study};
 pub use table::{Cell, Column, Table};
 pub use verdict::Verdict;
 

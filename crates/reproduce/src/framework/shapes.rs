@@ -2,6 +2,13 @@
 
 use scrnn::dataset::Dataset;
 use scrnn::generation::Generated;
+use scrnn_report::{Block, Drawing, Figure};
+
+/// A figure as a block.
+pub fn figure(file: &str, title: &str, caption: &str, thesis: &str, drawing: impl Into<Drawing>) -> Block {
+    let [file, title, caption, thesis] = [file, title, caption, thesis].map(str::to_owned);
+    Block::Figure(Box::new(Figure { file, title, caption, thesis, drawing: drawing.into() }))
+}
 
 /// The two units whose activations vary most while they do not vary alike.
 pub fn two_units(generated: &[Generated], units: usize) -> Option<(usize, usize)> {

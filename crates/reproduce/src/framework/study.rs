@@ -12,11 +12,12 @@ use scrnn_run::source::Source;
 use serde::Serialize;
 
 use super::comparison::Comparison;
+use super::condition::Condition;
 use super::desk::Desk;
+use super::job_result::TrainingFacts;
 use super::measure::Measure;
 use super::options::Options;
-use super::preset::Kind;
-use super::results::{Results, TrainingFacts};
+use super::results::Results;
 use super::stop::Result;
 use super::table::Table;
 use super::verdict::Verdict;
@@ -91,32 +92,6 @@ pub trait Study: Sync {
 
     /// Figures and tables, from the findings and the material of all jobs, in the same order.
     fn sections(&self, results: &Results<Self::Findings>, materials: &[Self::Material]) -> Vec<Section>;
-}
-
-/// Networks that learn under the same circumstances.
-#[derive(Debug, Clone, Copy)]
-pub struct Condition {
-    /// Names its run folders and its part of metrics.json; empty where a study has one condition only.
-    pub key: &'static str,
-    /// For the eye.
-    pub label: &'static str,
-    /// The networks to train for each seed; keys that a person changes are the first one's.
-    pub networks: &'static [Kind],
-    /// The most seeds that it gets.
-    pub most: Option<u64>,
-}
-
-impl Condition {
-    /// The only one of a study.
-    pub const fn only(networks: &'static [Kind]) -> Self {
-        Self { key: "", label: "", networks, most: None }
-    }
-
-    /// The name of a seed's run folder.
-    pub fn run(&self, seed: u64, kind: &Kind) -> String {
-        let name = if self.key.is_empty() { "seed" } else { self.key };
-        format!("{name}-{seed}{}", kind.suffix)
-    }
 }
 
 /// A seed under a condition, with its trained networks.

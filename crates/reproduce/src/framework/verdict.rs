@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
+use super::job_result::JobResult;
 use super::measure::Summary;
-use super::results::{JobResult, Results};
 
 /// Whether a goal is reached.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -67,19 +67,12 @@ impl Verdict {
         Self { goal: goal.to_owned(), needed: needed.to_owned(), found: Some(found), seeds: Vec::new(), met }
     }
 
-    /// A goal for a measure over seeds; none where no seed has it.
-    pub fn of_measure<F>(
-        results: &Results<F>,
-        goal: &str,
-        needed: &str,
-        key: &str,
-        met: impl Fn(&Summary) -> bool,
-    ) -> Option<Self> {
-        let summary = results.measure(key)?;
+    /// A goal for a measure over all seeds.
+    pub fn of_measure(goal: &str, needed: &str, summary: &Summary, met: impl Fn(&Summary) -> bool) -> Self {
         let (least, most) = summary.extent();
         let mean = summary.mean.unwrap_or(f64::NAN);
         let found = format!("{mean:.2}, from {least:.2} to {most:.2}");
-        Some(Self::overall(goal, needed, found, met(summary)))
+        Self::overall(goal, needed, found, met(summary))
     }
 
     /// "met" or "missed".

@@ -165,7 +165,7 @@ pub fn verdicts(results: &Results<Findings>) -> Vec<Verdict> {
     let most = |one: &Summary| one.extent().1;
     let mean = |one: &Summary| one.mean.unwrap_or(f64::NAN);
     let judge = |goal: &str, needed: &str, key: &str, met: &dyn Fn(&Summary) -> bool| {
-        Verdict::of_measure(results, goal, needed, key, met)
+        results.measure(key).map(|summary| Verdict::of_measure(goal, needed, summary, met))
     };
     let goals = [
         judge("wide: own orders regenerated", "31 of 32 on average, 28 at least", "wide_regenerated", &|one| {

@@ -1,7 +1,8 @@
 //! What of the reaching experiment is compared with the thesis, and the goals (thesis 4.3).
 
+use super::findings::{Driven, Findings};
 use super::trials::{Found, pooled_rate};
-use super::{Driven, Findings};
+
 use crate::framework::{JobResult, Measure, Verdict};
 
 /// What is compared with the thesis and over seeds.

@@ -7,10 +7,11 @@ use scrnn_sim::scene::Scene;
 use scrnn_sim::touching::{Cycle, HandState};
 use scrnn_sim::tutor::Demonstration;
 
+use super::findings::{Driven, Findings, Material, channel};
 use super::trials::{Found, Given, decided};
-use super::{Driven, Findings, Material, channel};
 use crate::framework::JobResult;
-use scrnn_report::{Block, Chart, Drawing, Figure, Panel, Picture, Pictures, Section, Series, Sheet, Tone, View};
+use crate::framework::shapes::figure;
+use scrnn_report::{Block, Chart, Panel, Picture, Pictures, Section, Series, Sheet, Tone, View};
 
 /// Samples of the figures over time: five cycles.
 const SHOWN: usize = 5 * CYCLE;
@@ -30,11 +31,6 @@ pub fn sections(jobs: &[JobResult<Findings>], materials: &[Material]) -> Vec<Sec
         Section { title: "Variance over the cycle".into(), blocks: super::variance_page::blocks(&findings.variance) },
         Section { title: "Drivers compared".into(), blocks: compared },
     ]
-}
-
-pub fn figure(file: &str, title: &str, caption: &str, thesis: &str, drawing: impl Into<Drawing>) -> Block {
-    let [file, title, caption, thesis] = [file, title, caption, thesis].map(str::to_owned);
-    Block::Figure(Box::new(Figure { file, title, caption, thesis, drawing: drawing.into() }))
 }
 
 /// The performances at the three positions.

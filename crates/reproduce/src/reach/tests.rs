@@ -1,8 +1,8 @@
 //! The reaching experiment in short.
 
 use super::*;
+use crate::framework::job_result::TrainingFacts;
 use crate::framework::preset::Preset;
-use crate::framework::results::TrainingFacts;
 use crate::framework::{JobResult, Learned};
 use scrnn::engine::{Engine, InstructionSet};
 use scrnn::initialization::initialize;

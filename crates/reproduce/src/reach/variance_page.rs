@@ -2,8 +2,8 @@
 
 use scrnn_report::{Block, Chart, Panel, Series, Sheet, Tone};
 
-use super::page::figure;
 use super::variance::ByPhase;
+use crate::framework::shapes::figure;
 
 /// Both.
 pub fn blocks(by_phase: &ByPhase) -> Vec<Block> {
