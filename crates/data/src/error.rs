@@ -137,7 +137,7 @@ pub enum FileError {
     },
 
     /// An option that makes sense for other formats only.
-    #[error("{path} is read as {format}; `{option}` goes with {known} only")]
+    #[error("{path} is a {format}; `{option}` goes with {known} only")]
     #[diagnostic(help("leave it out"))]
     UnknownOption {
         /// The file.

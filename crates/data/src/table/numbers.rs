@@ -95,7 +95,8 @@ pub fn has_thousands(text: &str) -> bool {
 
 /// Whether the text would be a number if its comma were a point.
 pub fn has_decimal_comma(text: &str) -> bool {
-    text.contains(',') && matches!(Value::of(&text.replacen(',', ".", 1)), Value::Number(_))
+    let digits = text.split_once(',').is_some_and(|(_, rest)| rest.starts_with(|c: char| c.is_ascii_digit()));
+    digits && matches!(Value::of(&text.replacen(',', ".", 1)), Value::Number(_))
 }
 
 /// What a cell of a table is.
