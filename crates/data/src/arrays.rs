@@ -13,7 +13,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::files::natural;
+use crate::natural::natural;
 use crate::reading::Topic;
 use crate::remark::Remark;
 use crate::samples::{Samples, Track};

@@ -15,10 +15,10 @@
 use std::collections::HashMap;
 
 use crate::budget::Budget;
-use crate::format::Source;
 use crate::problem::FormatProblem;
 use crate::reading::Facts;
 use crate::samples::{Samples, Track};
+use crate::source::Source;
 use crate::{FileError, Remark, Selection};
 
 const KIND: &str = "BVH";

@@ -1,37 +1,10 @@
 //! Several files as one data set: patterns, folders, the order people mean, and channels that are matched by name.
 
-use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
 use crate::FileError;
 use crate::format::Format;
-
-/// Compares names as people do: digits by the number they make (`demo_2` before `demo_10`).
-#[must_use]
-pub fn natural(a: &str, b: &str) -> Ordering {
-    let (mut a_rest, mut b_rest) = (a, b);
-    loop {
-        let (a_digits, b_digits) = (digits(a_rest), digits(b_rest));
-        let order = if !a_digits.is_empty() && !b_digits.is_empty() {
-            let (x, y) = (a_digits.trim_start_matches('0'), b_digits.trim_start_matches('0'));
-            x.len().cmp(&y.len()).then_with(|| x.cmp(y))
-        } else {
-            match (a_rest.chars().next(), b_rest.chars().next()) {
-                (None, None) => return a.cmp(b),
-                (x, y) => x.cmp(&y),
-            }
-        };
-        if order != Ordering::Equal {
-            return order;
-        }
-        let skip = |rest: &str, digits: &str| digits.len().max(rest.chars().next().map_or(0, char::len_utf8));
-        (a_rest, b_rest) = (&a_rest[skip(a_rest, a_digits)..], &b_rest[skip(b_rest, b_digits)..]);
-    }
-}
-
-fn digits(text: &str) -> &str {
-    &text[..text.len() - text.trim_start_matches(|c: char| c.is_ascii_digit()).len()]
-}
+use crate::natural::natural;
 
 /// The files that `pattern` names: itself, all that match its `*`, `?` and `[...]`, or all data files of a folder that is
 /// no data set by itself. In natural order.
@@ -168,6 +141,7 @@ fn one_of(set: &[char], c: char) -> Option<(bool, usize)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::cmp::Ordering;
 
     #[test]
     fn names_are_in_the_order_people_mean() {

@@ -12,7 +12,7 @@
 //! | `.bvh` | motion capture: a skeleton's angles | [`bvh`] |
 //! | `.ts` | labelled series | [`series`] |
 //!
-//! A format is one file and one line in [`format::FORMATS`]. Each reader gets a [`format::Source`] with a
+//! A format is one file and one line in [`format::FORMATS`]. Each reader gets a [`source::Source`] with a
 //! [`budget::Budget`] and makes [`samples::Samples`]; from there [`samples::Samples::finish`] is the one way to a
 //! [`Reading`]: channels are chosen, times held to even steps or resampled, missing values refused or passed on.
 //!
@@ -39,6 +39,7 @@ mod joining;
 mod lerobot;
 mod literal;
 mod mat;
+mod natural;
 mod npy;
 mod npz;
 mod parquet;
@@ -50,6 +51,7 @@ mod replace;
 pub mod samples;
 mod selection;
 mod series;
+pub mod source;
 pub mod suspicions;
 mod table;
 pub mod times;
@@ -57,8 +59,9 @@ mod unpack;
 
 pub use convert::{Conversion, convert, write_converted};
 pub use error::{ArrayProblem, ChannelsError, FileError, LineError, LineProblem, disk_help};
-pub use files::{expand, natural};
+pub use files::expand;
 pub use joining::read_all;
+pub use natural::natural;
 pub use problem::FormatProblem;
 pub use reading::{Facts, Gap, Reading, Topic};
 pub use recording::RecordingProblem;
@@ -66,7 +69,8 @@ pub use remark::{Level, Remark};
 pub use replace::{HALF_WRITTEN, replace};
 pub use selection::{Axes, Missing, Selection, TimeSource};
 
-use format::{Format, Source};
+use format::Format;
+use source::Source;
 
 /// Something known of each sample, to be written beside others: the mean, the variance, the contexts, ...
 #[derive(Debug, Clone, Copy)]

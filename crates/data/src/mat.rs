@@ -11,9 +11,9 @@
 
 use crate::arrays::{Array, Texts, to_samples};
 use crate::budget::Budget;
-use crate::format::Source;
 use crate::problem::FormatProblem;
 use crate::samples::Samples;
+use crate::source::Source;
 use crate::unpack::zlib_to_its_end;
 use crate::{FileError, Remark, Selection, hdf5};
 

@@ -12,9 +12,9 @@ use scrnn::dataset::Sequence;
 
 use crate::arrays::{Array, Texts, shape_text, to_samples};
 use crate::budget::{Budget, OverBudget};
-use crate::format::Source;
 use crate::literal::Literal;
 use crate::samples::Samples;
+use crate::source::Source;
 use crate::{ArrayProblem, Field, FileError, Selection};
 
 const MAGIC: &[u8] = b"\x93NUMPY";

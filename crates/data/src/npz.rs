@@ -13,9 +13,9 @@ use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 use super::npy::{Contents, array_bytes, file_error, parse};
 use crate::arrays::{Texts, to_samples};
 use crate::excerpt::shortened;
-use crate::format::Source;
 use crate::remark::Remark;
 use crate::samples::Samples;
+use crate::source::Source;
 use crate::{ArrayProblem, Field, FileError, Selection};
 
 /// Reads the file called `path`.

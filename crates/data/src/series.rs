@@ -11,9 +11,9 @@
 //! Each line is a sequence, called by its number and label. `?` is a missing value. Lines that begin with `#` or `%` are
 //! comments.
 
-use crate::format::Source;
 use crate::problem::FormatProblem;
 use crate::samples::{Samples, Track};
+use crate::source::Source;
 use crate::{FileError, Remark, Selection};
 
 /// Reads a file.

@@ -244,7 +244,7 @@ impl Chart {
         let body = svg.split_once(">\n").map_or("", |(_, body)| body);
         let dashed = format!("stroke=\"{}\"", Tone::Truth.hex());
         let body = body.replace(&dashed, &format!("{dashed} stroke-dasharray=\"14 9\""));
-        let title = super::page::escaped(title);
+        let title = super::escape::escaped(title);
         format!(
             "<svg viewBox=\"0 0 {WIDTH} {height}\" xmlns=\"http://www.w3.org/2000/svg\" role=\"img\">\n<title>{title}</title>\n{body}"
         )

@@ -8,6 +8,7 @@
 //! | `scenes` (default) | pictures of simulated scenes, see `Picture` |
 
 mod chart;
+mod escape;
 mod page;
 #[cfg(feature = "scenes")]
 mod picture;

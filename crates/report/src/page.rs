@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::chart::{Chart, on_white, themed};
+use super::escape::escaped;
 #[cfg(feature = "scenes")]
 use super::picture::Pictures;
 
@@ -236,11 +237,6 @@ impl Figure {
 fn is_number(cell: &str) -> bool {
     let number = cell.trim_end_matches([' ', '%']).split(" \u{b1} ").next().unwrap_or(cell);
     !number.is_empty() && number.parse::<f64>().is_ok() || cell == "\u{2013}"
-}
-
-/// A text in which nothing is read as a tag.
-pub fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use scrnn_sim::scene::{Body, Part, Scene, Shape};
 
 use super::chart::{TEXT, Tone, WIDTH, csv_field};
-use super::page::escaped;
+use super::escape::escaped;
 
 /// Pictures in rows, all from one point of view and in one scale.
 #[derive(Debug, Clone, PartialEq)]

@@ -10,10 +10,10 @@ use serde_json::{Value, json};
 use crate::args::{Part, Shared};
 use crate::output;
 use scrnn_data::{self as files, Level, Reading, Remark};
-use scrnn_run::run_folder::CHECKPOINT;
 use scrnn_report::Table;
 use scrnn_run::failure::{Ending, Result};
 use scrnn_run::notes::Score;
+use scrnn_run::run_folder::CHECKPOINT;
 use scrnn_run::trained::Trained;
 
 /// Show what is in a run folder, a checkpoint or a data file

@@ -15,9 +15,9 @@
 use std::collections::BTreeSet;
 
 use crate::budget::Budget;
-use crate::format::Source;
 use crate::problem::FormatProblem;
 use crate::samples::Samples;
+use crate::source::Source;
 use crate::{FileError, Selection};
 
 mod chunks;

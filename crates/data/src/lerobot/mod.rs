@@ -14,11 +14,11 @@
 use std::path::{Path, PathBuf};
 
 use crate::budget::Budget;
-use crate::format::Source;
 use crate::parquet::Parquet;
 use crate::problem::FormatProblem;
 use crate::reading::Facts;
 use crate::samples::Samples;
+use crate::source::Source;
 use crate::{FileError, Remark, Selection, natural};
 
 mod episodes;

@@ -1,10 +1,10 @@
 //! Which columns of a parquet table are channels, which tell episodes and times, and which are left out.
 
 use crate::budget::Budget;
-use crate::format::Source;
 use crate::parquet::Parquet;
 use crate::problem::FormatProblem;
 use crate::reading::Topic;
+use crate::source::Source;
 use crate::{FileError, Remark, Selection};
 
 use super::info::Info;

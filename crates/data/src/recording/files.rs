@@ -15,7 +15,7 @@ use super::message::{Channel, Each, Message, Schema, Trouble};
 use super::sqlite::{Database, Problem, Value};
 use super::{container, ros};
 use crate::budget::Budget;
-use crate::format::Source;
+use crate::source::Source;
 use crate::{FileError, RecordingProblem};
 
 /// Bytes of the largest `metadata.yaml` that is read.
@@ -149,7 +149,7 @@ impl<'s> Files<'s> {
         let mut count = 0;
         for ((storage, holder), name) in self.files.iter().zip(self.names()) {
             let in_file = |trouble| (name.clone(), trouble);
-            let opened: Result<Box<dyn crate::format::ReadSeek + '_>, Trouble> = match holder {
+            let opened: Result<Box<dyn crate::source::ReadSeek + '_>, Trouble> = match holder {
                 Holder::Given(source) => source.open().map_err(|error| Trouble::File(Box::new(error))),
                 Holder::Found(path) => match std::fs::File::open(path) {
                     Ok(file) => Ok(Box::new(file)),

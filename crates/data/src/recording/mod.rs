@@ -38,9 +38,9 @@ use joining::{Channels, Refusal, Series, join};
 use message::Trouble;
 use topics::{Findings, find};
 
-use crate::format::Source;
 use crate::remark::Remark;
 use crate::samples::{self, Samples};
+use crate::source::Source;
 use crate::{FileError, Selection, TimeSource, Topic};
 
 pub use files::is_bag;

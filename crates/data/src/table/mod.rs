@@ -14,9 +14,9 @@ use std::ops::Range;
 
 use crate::budget::OverBudget;
 use crate::excerpt::{excerpt, shortened};
-use crate::format::Source;
 use crate::remark::Remark;
 use crate::samples::Samples;
+use crate::source::Source;
 use crate::{FileError, LineError, LineProblem, Selection};
 
 use assembly::{Assembly, assemble};

@@ -8,7 +8,8 @@ use scrnn::scaling::Scaling;
 use scrnn::topology::{Prediction, Topology};
 
 use super::{
-    Data, Experiment, OptimiserName, ScalingChoice, ScalingConstants, ScalingName, ScalingRanges, TaskName, TimeSourceName, Training,
+    Data, Experiment, OptimiserName, ScalingChoice, ScalingConstants, ScalingName, ScalingRanges, TaskName,
+    TimeSourceName, Training,
 };
 use crate::failure::{Failure, Result};
 use scrnn_data::{Selection, TimeSource};
