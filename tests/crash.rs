@@ -7,6 +7,9 @@
 
 #![cfg(unix)]
 
+#[path = "crash/endings.rs"]
+mod endings;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};

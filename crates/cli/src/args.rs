@@ -10,6 +10,8 @@ use scrnn_run::failure::Result;
 use scrnn_run::messages::Messages;
 use scrnn_tasks::TaskName;
 
+use crate::output;
+
 /// Where the options of every command stand in the help.
 const SHARED: &str = "Options of every command";
 
@@ -41,7 +43,7 @@ impl Shared {
     /// Says something on stderr, unless told to be quiet.
     pub fn say(&self, message: impl std::fmt::Display) {
         if !self.quiet {
-            eprintln!("{message}");
+            output::say(message);
         }
     }
 }

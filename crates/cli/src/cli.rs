@@ -34,7 +34,9 @@ Exit codes:
   3    the training diverged; it was rolled back, and the last good state is saved
   4    a file could not be read or written
   5    refused: the run folder is busy or holds a run, or experiment or data changed
-  130  interrupted by Ctrl-C; the state is saved";
+  6    the results could not be written to stdout; files are written
+  130  interrupted by Ctrl-C; the state is saved
+       so for SIGHUP 129, SIGUSR1 138, SIGTERM 143, SIGXCPU 152";
 
 /// Recurrent networks that learn to predict sequences together with their own uncertainty
 ///
