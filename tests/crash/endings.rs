@@ -50,7 +50,9 @@ fn results_that_cannot_be_written_have_a_code_of_their_own_and_the_state_is_save
 /// A training that goes on until it is told to end, and has saved something.
 fn endless(script: &str) -> (Place, Child) {
     let place = Place::with(&SINE.replace("epochs = 1500", "epochs = 100000000"));
-    let script = format!("{script} exec {SCRNN} train sine.toml --out run --threads 1");
+    // Whoever started the tests may ignore signals, as `nohup` does.
+    let listening = if cfg!(target_os = "linux") && script.is_empty() { "env --default-signal" } else { "" };
+    let script = format!("{script} exec {listening} {SCRNN} train sine.toml --out run --threads 1");
     let mut command = Command::new("sh");
     command.args(["-c", &script]).current_dir(&place.0).stdout(Stdio::null()).stderr(Stdio::piped());
     let child = command.spawn().unwrap();

@@ -40,7 +40,17 @@ const NAMED: usize = 3;
 ///
 /// With --online the network follows the samples one by one instead. Whenever one arrives, the internal state at the tail
 /// of a sliding window climbs the likelihood of the window, and the next samples are predicted anew. DATA `-` reads
-/// lines from the standard input and answers each at once.
+/// lines from the standard input and answers each at once. A line holds a number for each channel, between commas, semicolons,
+/// tabs or spaces, in the network's order or in that of a first line with all the names; or it is a JSON object with the
+/// channels as keys, or with the lists `name` and `position`. A blank line ends a sequence, a last line without its end is
+/// no sample. An empty field, null, a number that is not finite, and one that lies 1e12 times as far out as anything that was
+/// learned are missing: a warning goes to stderr, and the network's own prediction stands in for that value.
+///
+/// With --json each answer is an object: `sample` (its number, from 1), `mean` and `variance` of the next sample in the data's
+/// units (empty before the network's delay is over), `forecast` (the means of the --ahead samples after it), `ln_likelihood`
+/// (nats per step and regarded channel of the window, before and after the regression; null where there was none),
+/// `milliseconds`, and `missing` (names, if any). With --full it holds `iterations`, `error` and `view` (`from`, `smoothed`,
+/// `contexts`, `predicted`, `variance`) instead.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
