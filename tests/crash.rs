@@ -9,6 +9,8 @@
 
 #[path = "crash/endings.rs"]
 mod endings;
+#[path = "crash/outputs.rs"]
+mod outputs;
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -4,6 +4,7 @@ mod args;
 mod cli;
 mod command;
 mod output;
+mod outputs;
 mod progress;
 mod signals;
 
@@ -57,7 +58,7 @@ fn code(ending: Result<Ending>, signal: Option<u8>) -> u8 {
                 (Failure::Output { .. }, Some(signal)) => signal,
                 _ => failure.code(),
             };
-            output::say(format_args!("{:?}", miette::Report::new(failure)));
+            output::show(failure);
             code
         }
     }

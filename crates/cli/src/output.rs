@@ -4,9 +4,11 @@
 //! command with a code of its own, after its files are written. Messages go to stderr, and one that cannot be written is
 //! dropped: a log on a full disk or a closed pipe is no reason to end a training.
 
+use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::{self, Write};
 
+use miette::{GraphicalReportHandler, GraphicalTheme};
 use serde::Serialize;
 
 use scrnn_run::failure::{Failure, Result};
@@ -26,7 +28,7 @@ pub fn offer(text: &str) -> Result<Reader> {
 }
 
 fn write_to(out: &mut impl Write, text: &str) -> Result<Reader> {
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+    match out.write_all(escaped(text).as_bytes()).and_then(|()| out.flush()) {
         Ok(()) => Ok(Reader::Listens),
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(Reader::Left),
         Err(source) => Err(Failure::Output { source }),
@@ -58,7 +60,38 @@ pub fn print_json(value: &impl Serialize) -> Result<()> {
 /// Says something on stderr, in one write; where that is not possible, to nobody.
 pub fn say(message: impl Display) {
     let line = format!("{message}\n");
+    let _ = io::stderr().lock().write_all(escaped(&line).as_bytes());
+}
+
+/// Shows a failure on stderr with what to do about it; in colours where a terminal has them.
+pub fn show(failure: Failure) {
+    let mut plain = String::new();
+    let handler = GraphicalReportHandler::new_themed(GraphicalTheme::unicode_nocolor());
+    if handler.render_report(&mut plain, &failure).is_ok() && matches!(escaped(&plain), Cow::Owned(_)) {
+        // Colours are control characters as well: without them, all others are known to come from names and files.
+        say(plain.trim_end_matches('\n'));
+        return;
+    }
+    let line = format!("{:?}\n", miette::Report::new(failure));
     let _ = io::stderr().lock().write_all(line.as_bytes());
+}
+
+/// A text whose characters move nothing on a terminal but to the next line or column: names from files may hold others.
+pub fn escaped(text: &str) -> Cow<'_, str> {
+    let moves = |c: char| {
+        c.is_control() && c != '\n' && c != '\t' || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    };
+    if !text.contains(moves) {
+        return Cow::Borrowed(text);
+    }
+    let mut shown = String::with_capacity(text.len());
+    for c in text.chars() {
+        match moves(c) {
+            true => shown.extend(c.escape_unicode()),
+            false => shown.push(c),
+        }
+    }
+    Cow::Owned(shown)
 }
 
 #[cfg(test)]
@@ -75,6 +108,15 @@ mod tests {
         fn flush(&mut self) -> io::Result<()> {
             Ok(())
         }
+    }
+
+    #[test]
+    fn names_move_nothing_on_a_terminal() {
+        assert_eq!(
+            escaped("a\u{1b}]0;pwn\u{7}\u{9b}31m\u{202e}b\n\tc"),
+            "a\\u{1b}]0;pwn\\u{7}\\u{9b}31m\\u{202e}b\n\tc"
+        );
+        assert!(matches!(escaped("a name, \u{e4} \u{2192}\n"), Cow::Borrowed(_)));
     }
 
     #[test]

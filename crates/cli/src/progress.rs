@@ -109,7 +109,7 @@ impl messages::Progress for Progress {
         match &self.display {
             Display::Quiet => {}
             Display::Lines => output::say(format_args!("{}{message}", self.label)),
-            Display::Bar(bar) => bar.println(format!("{}{message}", self.label)),
+            Display::Bar(bar) => bar.println(output::escaped(&format!("{}{message}", self.label))),
         }
     }
 

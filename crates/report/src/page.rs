@@ -233,14 +233,30 @@ impl Figure {
 }
 
 /// Whether a cell is a number, with or without its spread or a percent sign, or a dash in the place of one.
-fn is_number(cell: &str) -> bool {
+pub(super) fn is_number(cell: &str) -> bool {
     let number = cell.trim_end_matches([' ', '%']).split(" \u{b1} ").next().unwrap_or(cell);
     !number.is_empty() && number.parse::<f64>().is_ok() || cell == "\u{2013}"
 }
 
+/// A text of characters that XML may hold: names from files may have others, which are shown by their numbers.
+pub(super) fn printable(text: &str) -> std::borrow::Cow<'_, str> {
+    let foreign = |c: char| c.is_control() && !"\n\t\r".contains(c) || matches!(c, '\u{fffe}' | '\u{ffff}');
+    if !text.contains(foreign) {
+        return text.into();
+    }
+    let mut shown = String::with_capacity(text.len());
+    for c in text.chars() {
+        match foreign(c) {
+            true => shown.extend(c.escape_unicode()),
+            false => shown.push(c),
+        }
+    }
+    shown.into()
+}
+
 /// A text in which nothing is read as a tag.
 pub fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    printable(text).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use scrnn_tasks::{Task, TaskName, interact, make};
 
 use crate::args::{self, Shared};
 use crate::output;
+use crate::outputs::check_distinct;
 use scrnn_data::{self as files, Field};
 use scrnn_run::failure::{Ending, Failure, Result};
 
@@ -63,6 +64,8 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         let message = format!("--exact-positions does not go with {}", arguments.task.word());
         return Err(Failure::input(message, "it is for the task reach"));
     }
+    let truth = arguments.truth.clone().or_else(|| arguments.out.as_deref().map(beside));
+    check_distinct(&[("--out", arguments.out.as_deref()), ("--truth", truth.as_deref())], &[])?;
     match (arguments.task, film) {
         (TaskName::Reach, _) => return reach(arguments, size, shared),
         (TaskName::Interact, Some(path)) => {
@@ -81,7 +84,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         Some(path) => files::write(path, &samples)?,
         None => output::print(&files::csv(&samples))?,
     }
-    if let Some(path) = arguments.truth.clone().or_else(|| arguments.out.as_deref().map(beside)) {
+    if let Some(path) = truth {
         files::write(&path, &[Field { name: "mean", data: &means }, Field { name: "variance", data: &variances }])?;
         shared.say(format_args!("true means and variances: {}", path.display()));
     }

@@ -12,6 +12,7 @@ use serde_json::{Value, json};
 
 use crate::args::{Part, Shared};
 use crate::output;
+use crate::outputs::check_distinct;
 use scrnn_data::{self as files, Field};
 use scrnn_run::failure::{Ending, Failure, Result};
 use scrnn_run::trained::Trained;
@@ -100,6 +101,9 @@ enum Mode {
 
 /// Generates.
 pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
+    let inputs = [Some(arguments.run.as_path()), arguments.initial_state.as_deref(), arguments.data.as_deref()];
+    let named = [("RUN", inputs[0]), ("--initial-state", inputs[1]), ("--data", inputs[2])];
+    check_distinct(&[("--out", arguments.out.as_deref())], &named)?;
     let trained = Trained::open(&arguments.run, arguments.best)?;
     let feedback = feedback(arguments, &trained.checkpoint)?;
     let rows = starts::rows(

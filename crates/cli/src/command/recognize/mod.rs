@@ -22,6 +22,7 @@ use serde::Serialize;
 use crate::args::{Part, Shared};
 use crate::command::generate::unit_names;
 use crate::output;
+use crate::outputs::check_distinct;
 use online::{How, Online};
 use scrnn_data::{self as files, Field};
 use scrnn_report::Table;
@@ -140,6 +141,10 @@ struct Tried {
 
 /// Recognises.
 pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
+    check_distinct(
+        &[("--out", arguments.out.as_deref()), ("--completed", arguments.completed.as_deref())],
+        &[("DATA", Some(&arguments.data)), ("RUN", Some(&arguments.run))],
+    )?;
     if arguments.online.wanted() {
         let Arguments { run, data, part, best, rate, out, json, regression, .. } = arguments;
         let how = How { regression, rate: *rate };

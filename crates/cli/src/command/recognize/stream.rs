@@ -275,7 +275,7 @@ fn is_value(cell: &str) -> bool {
 fn split(line: &str) -> Vec<&str> {
     fn part(cell: &str) -> &str {
         let cell = cell.trim();
-        cell.strip_prefix('"').and_then(|cell| cell.strip_suffix('"')).unwrap_or(cell)
+        cell.strip_prefix('"').and_then(|cell| cell.strip_suffix('"')).map_or(cell, scrnn_data::unguarded)
     }
     let line = line.trim_end_matches(['\r', '\n']);
     match [';', ',', '\t'].into_iter().find(|separator| line.contains(*separator)) {

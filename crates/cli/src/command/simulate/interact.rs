@@ -14,6 +14,7 @@ use serde_json::json;
 use crate::args::Shared;
 use crate::command::recognize::{Latency, RegressionArguments};
 use crate::output;
+use crate::outputs::check_distinct;
 use scrnn_data::{self as files, Field};
 use scrnn_report::Table;
 use scrnn_run::failure::{Ending, Failure, Result};
@@ -81,6 +82,8 @@ struct Trial {
 
 /// Simulates.
 pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
+    let outputs = [("--out", arguments.out.as_deref()), ("--mcap", arguments.mcap.as_deref())];
+    check_distinct(&outputs, &[("RUN", Some(&arguments.run))])?;
     let trained = Trained::open(&arguments.run, arguments.best)?;
     let checkpoint = &trained.checkpoint;
     if checkpoint.channels.len() != CHANNELS.len() {

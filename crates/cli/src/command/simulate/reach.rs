@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::args::Shared;
 use crate::output;
+use crate::outputs::check_distinct;
 use scrnn_data as files;
 use scrnn_report::Table;
 use scrnn_run::experiment::Experiment;
@@ -112,6 +113,7 @@ struct Outcome<'a> {
 
 /// Simulates.
 pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
+    check_distinct(&[("--mcap", arguments.mcap.as_deref())], &[("RUN", Some(&arguments.run))])?;
     let trained = Trained::open(&arguments.run, arguments.best)?;
     let checkpoint = &trained.checkpoint;
     if checkpoint.channels != REACHING {
