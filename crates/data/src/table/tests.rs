@@ -2,7 +2,7 @@
 
 use super::*;
 use miette::SourceCode;
-use scrnn::dataset::Dataset;
+use scrnn::dataset::{Dataset, Sequence};
 
 /// Names of the channels, then name and values of each sequence.
 type Contents = (Vec<String>, Vec<(String, Vec<f64>)>);
