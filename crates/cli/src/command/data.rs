@@ -15,6 +15,7 @@ use crate::output;
 use crate::outputs::check_distinct;
 use scrnn_data::{self as files, Field};
 use scrnn_run::failure::{Ending, Failure, Result};
+use scrnn_run::memory::{self, product};
 
 /// Write the sequences of the thesis' experiments
 ///
@@ -39,10 +40,10 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Number of sequences [default: as in the thesis]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = args::count(1, 1_000_000))]
     sequences: Option<usize>,
     /// Samples in each sequence [default: as in the thesis, 1000; 180 for reach, 470 for interact]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = args::count(1, 1_000_000_000))]
     steps: Option<usize>,
     /// With reach: put the object exactly at its three positions, instead of up to 10 mm off
     #[arg(long)]
@@ -59,6 +60,8 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     let (sequences, steps) = arguments.task.size();
     let size = (arguments.sequences.unwrap_or(sequences), arguments.steps.unwrap_or(steps));
+    // Sample, mean and variance, and the samples as text.
+    memory::check("what is to be made", product(&[size.0, size.1, 3 * size_of::<f64>() + 16]))?;
     let film = arguments.out.as_deref().filter(|path| is_recording(path));
     if arguments.exact_positions && arguments.task != TaskName::Reach {
         let message = format!("--exact-positions does not go with {}", arguments.task.word());

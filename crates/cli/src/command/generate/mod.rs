@@ -57,13 +57,13 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     initial_state: Option<PathBuf>,
     /// Number of steps [default: as many as the data have]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = crate::args::count(1, 1_000_000_000))]
     steps: Option<usize>,
     /// No noise: what is fed back, and the sample, is the predicted mean
     #[arg(long)]
     no_noise: bool,
     /// Number of times that each sequence is generated, with noise of its own
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     samples: u32,
     /// Seed of the noise
     #[arg(long, value_name = "N", default_value_t = 1)]

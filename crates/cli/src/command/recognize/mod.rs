@@ -69,16 +69,16 @@ pub struct Arguments {
     #[command(flatten)]
     part: Part,
     /// Number of starts for each sequence
-    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     starts: u32,
     /// Number of updates from each start
-    #[arg(long, value_name = "N", default_value_t = 300)]
+    #[arg(long, value_name = "N", default_value_t = 300, value_parser = clap::value_parser!(u64).range(0..=1_000_000))]
     epochs: u64,
     /// Recognise from the first N samples, and complete the rest
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = crate::args::count(1, 1_000_000_000))]
     observed: Option<usize>,
     /// Rate of the ascent [default: one that suits most networks]
-    #[arg(long, value_name = "RATE")]
+    #[arg(long, value_name = "RATE", value_parser = crate::args::positive(1e6))]
     rate: Option<f64>,
     /// Seed of the random starts
     #[arg(long, value_name = "N", default_value_t = 1)]

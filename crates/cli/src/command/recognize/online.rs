@@ -20,6 +20,7 @@ use crate::output::{self, Reader};
 use scrnn_data::{self as files, Field};
 use scrnn_report::Table;
 use scrnn_run::failure::{Ending, Failure, Result};
+use scrnn_run::memory::{self, product};
 use scrnn_run::trained::{TOO_FAR, Trained};
 
 /// How to follow.
@@ -30,7 +31,7 @@ pub struct Online {
     #[arg(long, conflicts_with_all = ["observed", "completed", "starts", "epochs", "seed"])]
     online: bool,
     /// Samples to predict beyond the next one
-    #[arg(long, value_name = "N", default_value_t = 10, requires = "online")]
+    #[arg(long, value_name = "N", default_value_t = 10, requires = "online", value_parser = crate::args::count(0, 100_000))]
     ahead: usize,
     /// Channels whose input is the network's own prediction, as those of an arm that it moves
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', requires = "online")]
@@ -59,6 +60,9 @@ impl Online {
         let channels = &trained.checkpoint.channels;
         let mut options = how.regression.options(how.rate, channels.len())?;
         options.ahead = self.ahead;
+        let units = trained.checkpoint.topology.context_units();
+        let bytes = product(&[options.window + options.ahead, 2 * units + 4 * channels.len(), size_of::<f64>()]);
+        memory::check("a window of that length", bytes)?;
         for (names, shares) in
             [(&self.closed_channels, &mut options.sensed), (&self.masked_channels, &mut options.mask)]
         {

@@ -51,7 +51,7 @@ pub struct Arguments {
     #[arg(long)]
     ers: bool,
     /// Rate of the ascent [default: one that suits most networks]
-    #[arg(long, value_name = "RATE")]
+    #[arg(long, value_name = "RATE", value_parser = crate::args::positive(1e6))]
     rate: Option<f64>,
     #[command(flatten)]
     regression: RegressionArguments,

@@ -42,7 +42,7 @@ pub struct Arguments {
     #[arg(long, value_name = "1|2|3|Y", default_value = "1", allow_hyphen_values = true)]
     position: Place,
     /// Put the sphere elsewhere when this many samples are over; a sample lasts half a second
-    #[arg(long, value_name = "STEP", requires = "to")]
+    #[arg(long, value_name = "STEP", requires = "to", value_parser = crate::args::count(0, 1_000_000_000))]
     shift_at: Option<usize>,
     /// Where to put it
     #[arg(long, value_name = "1|2|3|Y", requires = "shift_at", allow_hyphen_values = true)]
