@@ -8,6 +8,10 @@ mod experiments;
 mod extremes;
 #[path = "cli/following.rs"]
 mod following;
+#[path = "cli/numbers.rs"]
+mod numbers;
+#[path = "cli/numbers_table.rs"]
+mod numbers_table;
 #[path = "cli/reaching.rs"]
 mod reaching;
 #[path = "cli/recordings.rs"]

@@ -302,6 +302,24 @@ fn the_library_opens_no_file_prints_nothing_and_reads_no_clock() {
 }
 
 #[test]
+fn only_one_file_of_the_program_prints() {
+    let words = ["println!", "print!", "io::stdout()", "io::stderr()", "dbg!"];
+    let one = "crates/cli/src/output.rs";
+    let mut problems = Vec::new();
+    for source in sources().iter().filter(|source| source.path.contains("/src/") && source.path != one) {
+        let program = source.text.split("#[cfg(test)]").next().unwrap_or_default().lines().count();
+        for (line, code, _) in source.lines().take(program).filter(|_| !source.is_test()) {
+            // Whether it is a terminal may be asked.
+            let code = code.replace("io::stderr().is_terminal()", "");
+            for word in words.iter().filter(|word| code.contains(*word)) {
+                problems.push(format!("{}:{line}: {word}", source.path));
+            }
+        }
+    }
+    report(&problems);
+}
+
+#[test]
 fn one_file_of_the_library_names_rayon() {
     let sources = sources();
     let names = |source: &&Text| source.path.starts_with("crates/scrnn/src/") && source.text.contains("rayon::");

@@ -56,19 +56,113 @@ fn a_stream_is_answered_line_by_line_with_what_a_file_gives() {
         (output.status.code(), String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap())
     };
     let samples = place.text("new.csv");
-    let (code, out, told) = stream("recognize run - --online --window 8 --steps 5 --json", &samples);
+    let (code, out, told) = stream("recognize run - --online --window 8 --steps 5 --json --full", &samples);
     assert_eq!(code, Some(0), "{told}");
     let lines: Vec<Value> = out.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert_eq!(lines.len(), 60);
     assert!(told.contains("ms a sample"), "{told}");
     let file = place.json("recognize run new.csv --online --window 8 --steps 5 --at 40 --json");
     assert_eq!(lines[39]["view"], file["sequences"][0]["steps"][39]["view"]);
+    // By default an answer is short: the next samples with their variance.
+    let (_, out, _) = stream("recognize run - --online --window 8 --steps 5 --ahead 2 --json", &samples);
+    let answer: Value = serde_json::from_str(out.lines().nth(39).unwrap()).unwrap();
+    let keys: Vec<&str> = answer.as_object().unwrap().keys().map(String::as_str).collect();
+    assert_eq!(keys, ["forecast", "ln_likelihood", "mean", "milliseconds", "sample", "variance"]);
+    let predicted = numbers(&lines[39]["view"]["predicted"]);
+    assert_eq!([numbers(&answer["mean"]), numbers(&answer["forecast"])].concat(), predicted[..3]);
     // A table for those who do not want JSON: the next sample as predicted.
     let (_, table, _) = stream("recognize run - --online --window 8 --steps 5 -q", "0.1\n0.2\n");
     assert!(table.starts_with("sample,iterations,milliseconds,y\n1,0,"), "{table}");
     assert_eq!(table.lines().count(), 3);
     let (code, _, told) = stream("recognize run - --online", "0.1\nabc\n");
     assert!(code == Some(2) && told.contains("line 2, y is `abc`"), "{told}");
+}
+
+/// A network on two channels.
+const TWO: &str = r#"
+name = "two"
+[data]
+task = "lissajous"
+sequences = 1
+steps = 60
+[[network.groups]]
+name = "context"
+units = 6
+time_constant = 2.0
+[training]
+epochs = 20
+optimiser = "adam"
+"#;
+
+#[test]
+fn missing_and_absurd_values_of_a_stream_disable_nothing() {
+    let place = Place::with(TWO);
+    place.ok("train sine.toml --out run -q");
+    let follow = |input: &str, options: &str| {
+        let mut command = Command::cargo_bin("scrnn").unwrap();
+        let line = format!("recognize run - --online --window 8 --steps 5 --json {options}");
+        let output = command.current_dir(&place.0).args(line.split_whitespace()).write_stdin(input).output().unwrap();
+        let lines: Vec<Value> =
+            String::from_utf8_lossy(&output.stdout).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+        (output.status.code(), lines, String::from_utf8(output.stderr).unwrap())
+    };
+    for bad in ["1e300,1e300", ",", "NaN,-inf", "null,1e999"] {
+        let (code, lines, told) = follow(&format!("0.1,0.2\n{bad}\n0.1,0.2\n0.1,0.2\n"), "--full");
+        assert_eq!((code, lines.len()), (Some(0), 4), "{bad}: {told}");
+        let iterations: Vec<u64> = lines.iter().map(|line| line["iterations"].as_u64().unwrap()).collect();
+        assert_eq!(iterations, [0, 5, 5, 5], "{bad}");
+        assert!(told.contains("line 2, ") && told.contains("the network's prediction stands in"), "{told}");
+    }
+    let (_, lines, _) = follow("0.1,0.2\n0.1,\n0.1,0.2\n", "");
+    assert_eq!((lines[1]["missing"].as_array().map(Vec::len), lines[2].get("missing")), (Some(1), None));
+    // A line that is cut is no sample, extra fields are refused, and so is a first line that is neither numbers nor names.
+    let (code, lines, told) = follow("0.1,0.2\n0.2,0.12", "");
+    assert_eq!((code, lines.len()), (Some(0), 1));
+    assert!(told.contains("has no end"), "{told}");
+    for (input, message) in
+        [("5,0.1,0.2\n", "has 3 fields"), ("0x1,0.2\n0.1,0.2\n", "neither all numbers nor all names")]
+    {
+        let (code, lines, told) = follow(input, "");
+        assert!(code == Some(2) && lines.is_empty() && told.contains(message), "{told}");
+    }
+    // What is not regarded does not dilute what is.
+    let likelihood = |options: &str| numbers(&follow("0.1,0.2\n0.1,0.2\n", options).1[1]["ln_likelihood"])[0];
+    let channels: Vec<String> =
+        serde_json::from_value::<Vec<Value>>(place.json("inspect run --json")["channels"].clone())
+            .unwrap()
+            .iter()
+            .map(|channel| channel["name"].as_str().unwrap().to_owned())
+            .collect();
+    let [first, second] = [0, 1].map(|k| likelihood(&format!("--masked-channels {}", channels[k])));
+    assert!((likelihood("") - (first + second) / 2.0).abs() < 1e-9, "{first} {second}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_stream_whose_reader_has_left_ends() {
+    use std::io::{BufRead, BufReader, Write};
+    use std::process::{Command, Stdio};
+    let place = trained();
+    for options in ["--json", ""] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_scrnn"));
+        command
+            .current_dir(&place.0)
+            .args("recognize run - --online -q".split_whitespace())
+            .args(options.split_whitespace());
+        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+        let (mut stdin, mut stdout) = (child.stdin.take().unwrap(), BufReader::new(child.stdout.take().unwrap()));
+        stdin.write_all(b"0.1\n").unwrap();
+        stdout.read_line(&mut String::new()).unwrap();
+        drop(stdout);
+        // It sees at one of its next answers that nobody reads them, and takes no more samples.
+        let mut taken = 0;
+        while stdin.write_all(b"0.1\n").is_ok() {
+            taken += 1;
+            assert!(taken < 10_000);
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        assert_eq!(child.wait().unwrap().code(), Some(0));
+    }
 }
 
 #[test]
@@ -79,11 +173,18 @@ fn a_deadline_is_kept_when_the_steps_do_not_fit() {
     let iterations = |step: &Value| step["iterations"].as_u64().unwrap();
     let steps = &sequence["steps"].as_array().unwrap()[1..];
     assert!(steps.iter().all(|step| iterations(step) < 1_000_000));
-    // Whoever shares the machine may take it away for longer than that now and then.
-    let regressed = steps.iter().filter(|step| iterations(step) > 0).count();
-    assert!(regressed > 30, "{regressed} of 59");
-    let missed = sequence["latency"]["missed"].as_u64().unwrap();
-    assert!(missed < 30, "{missed} of 60 missed");
+    // That none is late by a clock of its own is shown beside `Deadline`. By the machine's, which others may take away for a while,
+    // the counts must be those of the samples, and without a deadline each of them would take a hundred times as long.
+    let latency = &sequence["latency"];
+    let taken: Vec<f64> =
+        sequence["steps"].as_array().unwrap().iter().map(|step| numbers(&step["milliseconds"])[0]).collect();
+    let late = taken.iter().filter(|taken| **taken > 20.0).count() as u64;
+    assert_eq!(latency["missed"].as_u64(), Some(late));
+    let extremes = (taken.iter().copied().fold(f64::MAX, f64::min), taken.iter().copied().fold(0.0, f64::max));
+    assert_eq!((latency["shortest"].as_f64(), latency["longest"].as_f64()), (Some(extremes.0), Some(extremes.1)));
+    let on_time = steps.iter().filter(|step| numbers(&step["milliseconds"])[0] <= 20.0);
+    let total: u64 = on_time.clone().map(iterations).sum();
+    assert!(total > 10 * on_time.count() as u64, "{total} iterations in time");
 }
 
 #[test]

@@ -10,14 +10,17 @@ use scrnn_run::failure::Result;
 use scrnn_run::messages::Messages;
 use scrnn_tasks::TaskName;
 
+use crate::output;
+
 /// Where the options of every command stand in the help.
 const SHARED: &str = "Options of every command";
 
 /// Options of every command.
 #[derive(Debug, Args)]
 pub struct Shared {
-    /// Threads to work with; 0 takes one for each core. The result is the same to the bit
-    #[arg(long, global = true, value_name = "N", default_value_t = 0, hide_default_value = true, help_heading = SHARED)]
+    /// Threads to work with, at most 1024; 0 takes one for each core. The result is the same to the bit
+    #[arg(long, global = true, value_name = "N", default_value_t = 0, hide_default_value = true, help_heading = SHARED,
+        value_parser = count(0, 1024))]
     pub threads: usize,
     /// The vector instructions to use; by default the fastest that the processor has
     #[arg(long, global = true, value_name = "NAME", hide_short_help = true, help_heading = SHARED)]
@@ -41,7 +44,7 @@ impl Shared {
     /// Says something on stderr, unless told to be quiet.
     pub fn say(&self, message: impl std::fmt::Display) {
         if !self.quiet {
-            eprintln!("{message}");
+            output::say(message);
         }
     }
 }
@@ -66,9 +69,26 @@ pub struct Part {
     pub channels: Option<Vec<String>>,
 }
 
+/// A parser for numbers of things, which says its range.
+pub fn count(least: usize, most: usize) -> impl Fn(&str) -> std::result::Result<usize, String> + Clone + Send + Sync {
+    move |text| match text.parse::<usize>() {
+        Ok(count) if (least..=most).contains(&count) => Ok(count),
+        _ => Err(format!("give a whole number from {least} to {most}")),
+    }
+}
+
+/// A parser for positive numbers up to a bound, which says its range.
+pub fn positive(most: f64) -> impl Fn(&str) -> std::result::Result<f64, String> + Clone + Send + Sync {
+    move |text| match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value <= most => Ok(value),
+        _ => Err(format!("give a number above 0, at most {most:e}")),
+    }
+}
+
 fn period(text: &str) -> std::result::Result<f64, String> {
     let period: f64 = text.parse().map_err(|_| "give a number of seconds".to_owned())?;
-    if period > 0.0 && period.is_finite() { Ok(period) } else { Err("give a number of seconds above 0".to_owned()) }
+    let fits = (1e-9..=1e9).contains(&period);
+    if fits { Ok(period) } else { Err("give a number of seconds from 1e-9 to 1e9".to_owned()) }
 }
 
 impl Part {

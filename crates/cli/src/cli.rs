@@ -34,7 +34,9 @@ Exit codes:
   3    the training diverged; it was rolled back, and the last good state is saved
   4    a file could not be read or written
   5    refused: the run folder is busy or holds a run, or experiment or data changed
-  130  interrupted by Ctrl-C; the state is saved";
+  6    the results could not be written to stdout; files are written
+  130  interrupted by Ctrl-C; the state is saved
+       so for SIGHUP 129, SIGUSR1 138, SIGTERM 143, SIGXCPU 152";
 
 /// Recurrent networks that learn to predict sequences together with their own uncertainty
 ///
@@ -67,4 +69,44 @@ pub enum Command {
     #[command(verbatim_doc_comment, after_help = "Example:\n  scrnn schema > scrnn.schema.json")]
     Schema,
     Completions(completions::Arguments),
+}
+
+#[cfg(test)]
+#[path = "../../../tests/cli/numbers_table.rs"]
+mod numbers_table;
+
+#[cfg(test)]
+mod tests {
+    use std::any::TypeId;
+
+    use clap::CommandFactory;
+
+    use super::*;
+
+    /// Command and name of each option that is a number.
+    fn numeric(command: &clap::Command, path: &str, found: &mut Vec<(String, String)>) {
+        let numbers = [TypeId::of::<u32>(), TypeId::of::<u64>(), TypeId::of::<usize>(), TypeId::of::<f64>()];
+        for option in command.get_opts() {
+            let id = option.get_value_parser().type_id();
+            if numbers.iter().any(|number| id == *number) {
+                found.push((path.to_owned(), option.get_long().unwrap_or_default().to_owned()));
+            }
+        }
+        for inner in command.get_subcommands() {
+            let path =
+                if path == "scrnn" { inner.get_name().to_owned() } else { format!("{path} {}", inner.get_name()) };
+            numeric(inner, &path, found);
+        }
+    }
+
+    #[test]
+    fn every_numeric_option_has_its_rows_in_the_table_of_numbers() {
+        let mut found = Vec::new();
+        numeric(&Cli::command(), "scrnn", &mut found);
+        let mut listed: Vec<(String, String)> =
+            numbers_table::OPTIONS.iter().map(|(command, option, _)| ((*command).into(), (*option).into())).collect();
+        found.sort();
+        listed.sort();
+        assert_eq!(found, listed);
+    }
 }

@@ -4,6 +4,7 @@ mod args;
 mod cli;
 mod command;
 mod output;
+mod outputs;
 mod progress;
 mod signals;
 
@@ -12,32 +13,53 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use cli::{Cli, Command};
-use scrnn_run::failure::{Ending, Result};
+use scrnn_run::failure::{Ending, Failure, Result};
+use signals::Signals;
 
 fn main() -> ExitCode {
-    let Cli { shared, command } = Cli::parse();
+    let Cli { shared, command } = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(usage) => return ExitCode::from(told(&usage)),
+    };
+    let signals = Signals::default();
     let ending = match command {
         Command::Data(arguments) => command::data::run(&arguments, &shared),
-        Command::Train(arguments) => command::train::run(&arguments, &shared),
+        Command::Train(arguments) => command::train::run(&arguments, (&shared, &signals)),
         Command::Generate(arguments) => command::generate::run(&arguments, &shared),
         Command::Recognize(arguments) => command::recognize::run(&arguments, &shared),
         Command::Simulate(arguments) => command::simulate::run(&arguments, &shared),
-        Command::Reproduce(arguments) => command::reproduce::run(&arguments, &shared),
+        Command::Reproduce(arguments) => command::reproduce::run(&arguments, (&shared, &signals)),
         Command::Report(arguments) => command::report::run(&arguments, &shared),
         Command::Inspect(arguments) => command::inspect::run(&arguments, &shared),
         Command::Schema => command::schema::run(),
         Command::Completions(arguments) => command::completions::run(&arguments),
     };
-    exit_code(ending)
+    ExitCode::from(code(ending, signals.code()))
 }
 
-fn exit_code(ending: Result<Ending>) -> ExitCode {
+/// Shows help, version or what is wrong with the arguments; the exit code.
+fn told(usage: &clap::Error) -> u8 {
+    match usage.print() {
+        // The text to stdout is a result; on stderr it is a message.
+        Err(source) if !usage.use_stderr() && source.kind() != std::io::ErrorKind::BrokenPipe => {
+            code(Err(Failure::Output { source }), None)
+        }
+        _ => u8::try_from(usage.exit_code()).unwrap_or(2),
+    }
+}
+
+/// The exit code, after an error was told. A signal explains an early end, and results that its terminal does not take.
+fn code(ending: Result<Ending>, signal: Option<u8>) -> u8 {
     match ending {
-        Ok(ending) => ExitCode::from(ending.code()),
+        Ok(Ending::Interrupted) => signal.unwrap_or(Ending::Interrupted.code()),
+        Ok(ending) => ending.code(),
         Err(failure) => {
-            let code = failure.code();
-            eprintln!("{:?}", miette::Report::new(failure));
-            ExitCode::from(code)
+            let code = match (&failure, signal) {
+                (Failure::Output { .. }, Some(signal)) => signal,
+                _ => failure.code(),
+            };
+            output::show(failure);
+            code
         }
     }
 }

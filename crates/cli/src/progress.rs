@@ -8,8 +8,12 @@ use scrnn::learning::EpochReport;
 use scrnn_report::in_words;
 use scrnn_run::messages;
 
+use crate::output;
+
 /// Between two lines off a terminal.
 const BETWEEN_LINES: Duration = Duration::from_secs(5);
+/// Beyond this nobody waits.
+const LONGEST: Duration = Duration::from_secs(1000 * 365 * 86400);
 /// Between two updates of the bar.
 const BETWEEN_UPDATES: Duration = Duration::from_millis(100);
 
@@ -85,12 +89,14 @@ impl messages::Progress for Progress {
         };
         message += &format!("  rate {:.1e}", report.rate_shared);
         if speed > 0.0 {
-            let left = Duration::from_secs_f64((self.total - report.epoch.min(self.total)) as f64 / speed);
-            message += &format!("  {} epochs/s  {} left", rounded(speed), in_words(left));
+            let left = left(self.total.saturating_sub(report.epoch), speed);
+            message += &format!("  {} epochs/s  {left} left", rounded(speed));
         }
         match &self.display {
             Display::Quiet => {}
-            Display::Lines => eprintln!("{}epoch {}/{}  {message}", self.label, report.epoch, self.total),
+            Display::Lines => {
+                output::say(format_args!("{}epoch {}/{}  {message}", self.label, report.epoch, self.total));
+            }
             Display::Bar(bar) => {
                 bar.set_position(report.epoch);
                 bar.set_message(message);
@@ -102,8 +108,8 @@ impl messages::Progress for Progress {
     fn say(&self, message: &str) {
         match &self.display {
             Display::Quiet => {}
-            Display::Lines => eprintln!("{}{message}", self.label),
-            Display::Bar(bar) => bar.println(format!("{}{message}", self.label)),
+            Display::Lines => output::say(format_args!("{}{message}", self.label)),
+            Display::Bar(bar) => bar.println(output::escaped(&format!("{}{message}", self.label))),
         }
     }
 
@@ -115,7 +121,28 @@ impl messages::Progress for Progress {
     }
 }
 
+/// How long so many epochs take at so many a second. Who asks for 2^63 of them gets more than a `Duration` holds.
+fn left(epochs: u64, speed: f64) -> String {
+    match Duration::try_from_secs_f64(epochs as f64 / speed) {
+        Ok(left) if left < LONGEST => in_words(left),
+        _ => "more than 1000 years".to_owned(),
+    }
+}
+
 /// Three digits are enough for a speed.
 fn rounded(speed: f64) -> String {
     if speed < 100.0 { format!("{speed:.1}") } else { format!("{speed:.0}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn epochs_that_nobody_can_wait_for_are_told_and_no_panic() {
+        assert_eq!(left(100, 10.0), in_words(Duration::from_secs(10)));
+        for (epochs, speed) in [(u64::MAX, 0.1), (i64::MAX as u64, 1.9), (u64::MAX, f64::MIN_POSITIVE)] {
+            assert_eq!(left(epochs, speed), "more than 1000 years");
+        }
+    }
 }

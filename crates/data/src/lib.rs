@@ -66,8 +66,9 @@ pub use problem::FormatProblem;
 pub use reading::{Facts, Gap, Reading, Topic};
 pub use recording::RecordingProblem;
 pub use remark::{Level, Remark};
-pub use replace::{HALF_WRITTEN, replace};
+pub use replace::{HALF_WRITTEN, is_one_file, replace, sweep};
 pub use selection::{Axes, Missing, Selection, TimeSource};
+pub use table::unguarded;
 
 use format::Format;
 use source::Source;

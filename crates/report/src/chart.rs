@@ -87,7 +87,11 @@ pub(super) fn on_white(svg: &str) -> String {
 
 /// A text as a field of a CSV file.
 pub(super) fn csv_field(text: &str) -> String {
-    match text.contains([',', '"', '\n']) {
+    // A spreadsheet would take these for formulas, and run what they say.
+    let formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']) && text != "-" && !super::page::is_number(text);
+    let formula = if formula { "'" } else { "" };
+    let text = &format!("{formula}{}", super::page::printable(text));
+    match text.contains([',', '"', '\n', '\'', '\t', '\r']) {
         true => format!("\"{}\"", text.replace('"', "\"\"")),
         false => text.to_owned(),
     }
@@ -241,6 +245,7 @@ impl Chart {
             self.draw(&root, legend).expect("a string takes all");
             root.present().expect("a string takes all");
         }
+        let svg = super::page::printable(&svg);
         let body = svg.split_once(">\n").map_or("", |(_, body)| body);
         let dashed = format!("stroke=\"{}\"", Tone::Truth.hex());
         let body = body.replace(&dashed, &format!("{dashed} stroke-dasharray=\"14 9\""));
@@ -399,6 +404,25 @@ mod tests {
         };
         let panels = vec![panel("a, b", false), panel("c", true)];
         Chart { columns: 2, aspect: 1.5, x_label: "step".into(), y_label: "y".into(), panels }
+    }
+
+    #[test]
+    fn names_are_no_formulas_and_no_control_characters() {
+        for (name, field) in [
+            ("=cmd|'/c calc'!A1", "\"'=cmd|'/c calc'!A1\""),
+            ("@SUM(1)", "\"'@SUM(1)\""),
+            ("-0.5", "-0.5"),
+            ("-1+cmd", "\"'-1+cmd\""),
+            ("-", "-"),
+            ("plain", "plain"),
+            ("a\u{1b}[31m", "a\\u{1b}[31m"),
+        ] {
+            assert_eq!(csv_field(name), field);
+        }
+        let mut evil = chart();
+        evil.panels[0].title = "a\u{1b}]0;pwn\u{7}\u{fffe}".to_owned();
+        let svg = evil.svg("b\u{1b}");
+        assert!(svg.contains("a\\u{1b}]0;pwn\\u{7}\\u{fffe}") && svg.contains("<title>b\\u{1b}</title>"), "{svg}");
     }
 
     #[test]

@@ -7,7 +7,8 @@
 //! | 3 | the training diverged; the last good state is saved |
 //! | 4 | a file could not be read or written |
 //! | 5 | refused: the run folder is busy or holds a run, or experiment or data changed |
-//! | 130 | interrupted by Ctrl-C; the state is saved |
+//! | 6 | the results could not be written to stdout; files are written |
+//! | 129, 130, 138, 143, 152 | ended by SIGHUP, Ctrl-C, SIGUSR1, SIGTERM, SIGXCPU; the state is saved |
 
 use std::io;
 use std::ops::Range;
@@ -24,7 +25,7 @@ pub enum Ending {
     Done,
     /// Training left the finite numbers and was rolled back.
     Diverged,
-    /// Ctrl-C.
+    /// Ctrl-C or another signal. Which one it was, only the program knows.
     Interrupted,
 }
 
@@ -65,6 +66,15 @@ pub enum Failure {
         help: Option<&'static str>,
     },
 
+    /// Results cannot be written to stdout: a full disk behind it, a terminal that is gone.
+    #[error("cannot write the results to stdout")]
+    #[diagnostic(help("files that the command writes are complete; call it again with stdout on another disk"))]
+    Output {
+        /// What the system said.
+        #[source]
+        source: io::Error,
+    },
+
     /// The request is clear, but would do harm.
     #[error("{message}")]
     Refused {
@@ -100,6 +110,7 @@ impl Failure {
             Self::File(FileError::Disk { .. }) | Self::Disk { .. } => 4,
             Self::Input(_) | Self::File(_) => 2,
             Self::Refused { .. } => 5,
+            Self::Output { .. } => 6,
         }
     }
 

@@ -11,6 +11,7 @@ use std::path::Path;
 use scrnn::learning::EpochReport;
 
 use crate::failure::{Failure, Result};
+use crate::messages::Messages;
 use crate::run_folder::{HISTORY, RunFolder};
 
 const HEADER: &str = "epoch,nll,mse,rate_shared,rate_initial,gradient_norm,seconds,recoveries\n";
@@ -30,7 +31,8 @@ pub struct Row {
 
 /// The rows of a history file, up to the first that is not whole.
 pub fn read(path: &Path) -> Result<Vec<Row>> {
-    let text = std::fs::read_to_string(path).map_err(|error| Failure::disk("read", path, error))?;
+    let bytes = std::fs::read(path).map_err(|error| Failure::disk("read", path, error))?;
+    let text = String::from_utf8_lossy(&bytes);
     let row = |line: &str| {
         let mut fields = line.split(',');
         let epoch = fields.next()?.parse().ok()?;
@@ -40,7 +42,7 @@ pub fn read(path: &Path) -> Result<Vec<Row>> {
         let recoveries = fields.nth(4).map_or(Some(0), |field| field.parse().ok())?;
         Some(Row { epoch, nll: nll.parse().ok(), mse, recoveries })
     };
-    let (kept, _) = rows_up_to(&text, u64::MAX);
+    let (kept, _, _) = rows_up_to(&text, u64::MAX);
     Ok(kept.lines().map_while(row).collect())
 }
 
@@ -60,14 +62,23 @@ impl History {
     }
 
     /// Goes on with the file of a run whose checkpoint stands at `epoch`.
-    pub fn go_on(run: &RunFolder, epoch: u64) -> Result<Self> {
+    ///
+    /// Damage before that is said: the rows from there on are lost, the training is not.
+    pub fn go_on(run: &RunFolder, epoch: u64, messages: &dyn Messages) -> Result<Self> {
         let path = run.file(HISTORY);
-        let text = match std::fs::read_to_string(&path) {
-            Ok(text) => text,
+        // A byte that is no text spoils its line, not what stands before it.
+        let text = match std::fs::read(&path) {
+            Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
             Err(error) => return Err(Failure::disk("read", &path, error)),
         };
-        let (kept, last) = rows_up_to(&text, epoch);
+        let (kept, last, damaged) = rows_up_to(&text, epoch);
+        if let Some(line) = damaged {
+            messages.say(&format!(
+                "{}: line {line} is damaged; the history is cut before it and goes on from epoch {epoch}",
+                path.display()
+            ));
+        }
         run.write(HISTORY, format!("{HEADER}{kept}").as_bytes())?;
         let (last_epoch, seconds_before) = last.map_or((None, 0.0), |(epoch, seconds)| (Some(epoch), seconds));
         Ok(Self { waiting: String::new(), last_epoch, seconds_before })
@@ -111,22 +122,28 @@ impl History {
     }
 }
 
-/// The whole rows up to `epoch`, and epoch and seconds of the last of them.
-fn rows_up_to(text: &str, epoch: u64) -> (String, Option<(u64, f64)>) {
-    let (mut kept, mut last) = (String::new(), None);
-    for line in text.split_inclusive('\n').skip(1) {
+/// The whole rows up to `epoch`, epoch and seconds of the last of them, and the number of the line that ended them by being no
+/// row, unless that is a last one that was half written.
+fn rows_up_to(text: &str, epoch: u64) -> (String, Option<(u64, f64)>, Option<usize>) {
+    let (mut kept, mut last, mut damaged) = (String::new(), None, None);
+    for (number, line) in text.split_inclusive('\n').enumerate().skip(1) {
         let mut fields = line.trim_end().split(',');
         let row = fields.next().and_then(|field| field.parse::<u64>().ok());
         let seconds = fields.nth(5).and_then(|field| field.parse::<f64>().ok());
-        match (row, seconds) {
+        let whole = line.trim_end().split(',').all(|field| field.is_empty() || field.parse::<f64>().is_ok());
+        match (row.filter(|_| whole), seconds) {
             (Some(row), Some(seconds)) if row <= epoch && line.ends_with('\n') => {
                 kept.push_str(line);
                 last = Some((row, seconds));
             }
-            _ => break,
+            (Some(row), Some(_)) if row > epoch => break,
+            _ => {
+                damaged = line.ends_with('\n').then_some(number + 1);
+                break;
+            }
         }
     }
-    (kept, last)
+    (kept, last, damaged)
 }
 
 #[cfg(test)]
@@ -157,9 +174,13 @@ mod tests {
     fn rows_beyond_the_checkpoint_and_half_lines_are_cut_off() {
         let row = |epoch| format!("{epoch},0.5,0.1,1e-7,1e-4,2.0,{epoch}.250\n");
         let text = format!("{HEADER}{}{}{}", row(0), row(10), row(20));
-        assert_eq!(rows_up_to(&text, 10), (format!("{}{}", row(0), row(10)), Some((10, 10.25))));
+        assert_eq!(rows_up_to(&text, 10), (format!("{}{}", row(0), row(10)), Some((10, 10.25)), None));
         let half = &text[..text.len() - 3];
         assert_eq!(rows_up_to(half, 100).1, Some((10, 10.25)));
-        assert_eq!(rows_up_to("", 100), (String::new(), None));
+        assert_eq!(rows_up_to("", 100), (String::new(), None, None));
+        let bad = text.replace("10,0.5", "10,0\u{fffd}5");
+        assert_eq!(rows_up_to(&bad, 100), (row(0), Some((0, 0.25)), Some(3)));
+        let bad = text.replace("\n10,", "\n1\u{fffd},");
+        assert_eq!(rows_up_to(&bad, 100), (row(0), Some((0, 0.25)), Some(3)));
     }
 }

@@ -19,6 +19,12 @@ impl Interrupt {
         self.0.swap(true, Ordering::SeqCst)
     }
 
+    /// The flag itself, for whoever can do no more than set one: the handler of a signal.
+    #[must_use]
+    pub fn flag(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.0)
+    }
+
     /// Whether somebody asked.
     #[must_use]
     pub fn asked(&self) -> bool {

@@ -10,6 +10,7 @@
 //! | [`trained`], [`channels`] | a trained network as it is found again, and new data brought to its channels by name |
 //! | [`assessment`], [`truth`] | how well it predicts, beside simple models and what is known of the noise |
 //! | [`messages`], [`interrupt`] | how news and progress leave, and how a person's wish to stop comes in |
+//! | [`memory`] | what would not fit is refused before it is tried |
 //! | [`failure`] | what ends a request early, and with which exit code |
 //!
 //! Nothing here knows a terminal or a command line: progress and messages are handed in.
@@ -20,6 +21,7 @@ pub mod experiment;
 pub mod failure;
 pub mod history;
 pub mod interrupt;
+pub mod memory;
 pub mod messages;
 pub mod notes;
 pub mod run_folder;

@@ -4,7 +4,7 @@ use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
 
 use crate::failure::{Failure, Result};
-use scrnn_data::{self as files, HALF_WRITTEN};
+use scrnn_data as files;
 
 /// The experiment with every value explicit.
 pub const EXPERIMENT: &str = "experiment.toml";
@@ -45,12 +45,7 @@ impl RunFolder {
             }
             Err(TryLockError::Error(error)) => return Err(Failure::disk("lock", &lock_path, error)),
         }
-        let entries = fs::read_dir(path).map_err(|error| Failure::disk("list", path, error))?;
-        for entry in entries.flatten() {
-            if entry.file_name().to_string_lossy().starts_with(HALF_WRITTEN) {
-                fs::remove_file(entry.path()).map_err(|error| Failure::disk("remove", &entry.path(), error))?;
-            }
-        }
+        files::sweep(path).map_err(|error| Failure::disk("remove half-written files in", path, error))?;
         Ok(Self { path: path.to_owned(), _lock: lock })
     }
 
@@ -83,6 +78,7 @@ impl RunFolder {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use scrnn_data::HALF_WRITTEN;
 
     #[test]
     fn a_second_owner_is_refused_until_the_first_is_gone() {

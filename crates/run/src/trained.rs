@@ -16,7 +16,7 @@ use crate::source;
 use scrnn_data::Selection;
 
 /// Scaled samples from here on are refused: predictions lie between -1 and 1.
-const TOO_FAR: f64 = 1e12;
+pub const TOO_FAR: f64 = 1e12;
 
 /// A checkpoint with what the program noted in it.
 #[derive(Debug)]

@@ -102,7 +102,7 @@ pub fn train(
         learner = Learner::resume(&checkpoint, &scaled, experiment.plan(), engine)?;
         messages.say(&format!("going on with {} at epoch {}", path.display(), learner.epoch()));
         write_experiment(&run, experiment)?;
-        (notes, History::go_on(&run, learner.epoch())?)
+        (notes, History::go_on(&run, learner.epoch(), messages)?)
     } else {
         // In this order: a kill in between leaves a folder without a run rather than parts of two.
         for name in [CHECKPOINT, BEST, HISTORY] {

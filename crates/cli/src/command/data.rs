@@ -12,8 +12,10 @@ use scrnn_tasks::{Task, TaskName, interact, make};
 
 use crate::args::{self, Shared};
 use crate::output;
+use crate::outputs::check_distinct;
 use scrnn_data::{self as files, Field};
 use scrnn_run::failure::{Ending, Failure, Result};
+use scrnn_run::memory::{self, product};
 
 /// Write the sequences of the thesis' experiments
 ///
@@ -38,10 +40,10 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Number of sequences [default: as in the thesis]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = args::count(1, 1_000_000))]
     sequences: Option<usize>,
     /// Samples in each sequence [default: as in the thesis, 1000; 180 for reach, 470 for interact]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = args::count(1, 1_000_000_000))]
     steps: Option<usize>,
     /// With reach: put the object exactly at its three positions, instead of up to 10 mm off
     #[arg(long)]
@@ -58,11 +60,15 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     let (sequences, steps) = arguments.task.size();
     let size = (arguments.sequences.unwrap_or(sequences), arguments.steps.unwrap_or(steps));
+    // Sample, mean and variance, and the samples as text.
+    memory::check("what is to be made", product(&[size.0, size.1, 3 * size_of::<f64>() + 16]))?;
     let film = arguments.out.as_deref().filter(|path| is_recording(path));
     if arguments.exact_positions && arguments.task != TaskName::Reach {
         let message = format!("--exact-positions does not go with {}", arguments.task.word());
         return Err(Failure::input(message, "it is for the task reach"));
     }
+    let truth = arguments.truth.clone().or_else(|| arguments.out.as_deref().map(beside));
+    check_distinct(&[("--out", arguments.out.as_deref()), ("--truth", truth.as_deref())], &[])?;
     match (arguments.task, film) {
         (TaskName::Reach, _) => return reach(arguments, size, shared),
         (TaskName::Interact, Some(path)) => {
@@ -81,7 +87,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         Some(path) => files::write(path, &samples)?,
         None => output::print(&files::csv(&samples))?,
     }
-    if let Some(path) = arguments.truth.clone().or_else(|| arguments.out.as_deref().map(beside)) {
+    if let Some(path) = truth {
         files::write(&path, &[Field { name: "mean", data: &means }, Field { name: "variance", data: &variances }])?;
         shared.say(format_args!("true means and variances: {}", path.display()));
     }

@@ -11,7 +11,7 @@ use scrnn_run::failure::{Ending, Result};
 use crate::args::Shared;
 use crate::output;
 use crate::progress::Bars;
-use crate::signals;
+use crate::signals::Signals;
 
 /// Reproduce an experiment of the thesis, and write a page about it
 ///
@@ -85,8 +85,8 @@ fn experiments() -> impl TypedValueParser<Value = &'static Experiment> {
 }
 
 /// Reproduces.
-pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
-    let interrupt = signals::listen();
+pub fn run(arguments: &Arguments, (shared, signals): (&Shared, &Signals)) -> Result<Ending> {
+    let interrupt = signals.listen();
     let bars = Bars::new(shared.quiet);
     let context = Context {
         threads: shared.engine()?.threads(),

@@ -8,7 +8,7 @@ use scrnn::learning::Outcome;
 use crate::args::Shared;
 use crate::output;
 use crate::progress::Bars;
-use crate::signals;
+use crate::signals::Signals;
 use scrnn_run::experiment::{self, Override};
 use scrnn_run::failure::{Ending, Failure, Result};
 use scrnn_run::run_folder::{BEST, CHECKPOINT, EXPERIMENT};
@@ -18,8 +18,9 @@ use scrnn_run::verdict::Verdict;
 /// Train a network as an experiment file says
 ///
 /// The run folder receives experiment.toml (every value explicit), checkpoint.safetensors (the newest state),
-/// best.safetensors (the lowest nll so far) and history.csv (how training went). Ctrl-C ends the epoch, saves, and says
-/// how to go on; a run that was killed goes on from its last checkpoint. Either way the result is the same to the bit as
+/// best.safetensors (the lowest nll so far) and history.csv (how training went). Ctrl-C (also SIGTERM,
+/// SIGHUP, SIGUSR1 and SIGXCPU, unless the parent ignores them as nohup does) ends the epoch, saves, and says how to go on; a
+/// run that was killed goes on from its last checkpoint. Either way the result is the same to the bit as
 /// if the run had never stopped.
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -92,7 +93,7 @@ impl Arguments {
 }
 
 /// Trains.
-pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
+pub fn run(arguments: &Arguments, (shared, signals): (&Shared, &Signals)) -> Result<Ending> {
     let (file, folder) = arguments.experiment_file()?;
     let experiment = experiment::read(&file, &arguments.overrides()?)?;
     let experiment = experiment.resolved(file.parent().unwrap_or(Path::new("")))?;
@@ -100,7 +101,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     let path = folder.map(Path::to_owned).or_else(|| arguments.out.clone()).unwrap_or_else(default_folder);
 
     let engine = shared.engine()?;
-    let interrupt = signals::listen();
+    let interrupt = signals.listen();
     let progress = Bars::new(shared.quiet).bar("", experiment.training.epochs);
     let found = if arguments.resume {
         if !path.join(CHECKPOINT).exists() {
@@ -135,10 +136,10 @@ fn ending(training: &Training, path: &Path, shared: &Shared) -> Ending {
             Ending::Interrupted
         }
         Outcome::Diverged(divergence) => {
-            eprintln!(
+            output::say(format_args!(
                 "{divergence}, which is saved in {folder}; the best network is {folder}/{BEST}.\n\
                  Train anew with a smaller rate, a variance_floor above 0 or, with adam, a smaller clip_norm."
-            );
+            ));
             Ending::Diverged
         }
     }

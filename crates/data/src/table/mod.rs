@@ -38,6 +38,8 @@ mod roles;
 mod rows;
 pub mod writing;
 
+pub use writing::unguarded;
+
 /// Reads a table whose fields stand between commas, or whatever else is found.
 pub fn read_csv(source: &Source<'_>, selection: &Selection) -> Result<Samples, FileError> {
     read(source, DetectionOrder::CommaFirst, selection)

@@ -127,7 +127,7 @@ pub fn plans(layout: &Layout, selection: &Selection) -> Vec<Plan> {
         let role = given.and_then(|name| role(index, name));
         channels += usize::from(role.is_none());
         let name = match given {
-            Some(name) if !name.is_empty() || role.is_some() => name.to_owned(),
+            Some(name) if !name.is_empty() || role.is_some() => super::writing::unguarded(name).to_owned(),
             _ => format!("y{channels}"),
         };
         let parts = if let Holds::Lists(parts) = column.holds { parts } else { 1 };
@@ -244,6 +244,7 @@ impl Rows {
         for (index, (plan, field)) in plans.iter().zip(fields).enumerate() {
             let text = field.text.as_ref();
             if plan.labels {
+                let text = super::writing::unguarded(text);
                 let known = labels[index].get(text).copied();
                 let label = match known {
                     Some(label) => label,

@@ -2,7 +2,7 @@
 
 use super::*;
 use miette::SourceCode;
-use scrnn::dataset::Dataset;
+use scrnn::dataset::{Dataset, Sequence};
 
 /// Names of the channels, then name and values of each sequence.
 type Contents = (Vec<String>, Vec<(String, Vec<f64>)>);
@@ -155,4 +155,22 @@ fn a_large_file_keeps_its_line_numbers_in_the_message() {
     let Err(FileError::Line(error)) = read_text(&text) else { panic!("the last line is short") };
     assert_eq!(error.line, 300_001);
     assert!(error.text.inner().len() < 1000);
+}
+
+#[test]
+fn names_that_a_spreadsheet_would_run_are_written_apart_and_read_back() {
+    let names = ["=cmd|'/c calc'!A1", "@SUM(1)", "-1+cmd", "+x", "plain"].map(str::to_owned).to_vec();
+    let sequence = Sequence::new("=1+1", 5, vec![0.5; 10]).unwrap();
+    let data = Dataset::new(names, vec![sequence]).unwrap();
+    let text = crate::csv(&[crate::Field { name: "", data: &data }]);
+    let cells = text.lines().flat_map(|line| line.split(',')).map(|cell| cell.trim_start_matches('"'));
+    assert!(
+        cells.clone().count() > 10 && !cells.into_iter().any(|cell| cell.starts_with(['=', '@', '+', '-'])),
+        "{text}"
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.csv");
+    crate::write(&path, &[crate::Field { name: "", data: &data }]).unwrap();
+    let again = crate::read(&path).unwrap();
+    assert_eq!((again.channels(), &again.sequences()[0].name), (data.channels(), &data.sequences()[0].name));
 }

@@ -119,8 +119,19 @@ fn labels(data: &Dataset) -> Vec<String> {
 /// A name in quotes if it holds anything that could be taken for something else.
 fn quoted(name: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "_-+./:()[]".contains(c);
-    if !name.is_empty() && name.chars().all(plain) {
+    if !name.is_empty() && name.chars().all(plain) && !is_formula(name) {
         return name.to_owned();
     }
-    format!("\"{}\"", name.replace(char::is_control, " ").replace('"', "\"\""))
+    let guard = if is_formula(name) { "'" } else { "" };
+    format!("\"{guard}{}\"", name.replace(char::is_control, " ").replace('"', "\"\""))
+}
+
+/// Whether a spreadsheet would take the text for a formula, and run what it says. An apostrophe before it prevents that.
+fn is_formula(text: &str) -> bool {
+    text.starts_with(['=', '+', '-', '@']) && text.parse::<f64>().is_err()
+}
+
+/// The name without the apostrophe that was put before a formula.
+pub fn unguarded(name: &str) -> &str {
+    name.strip_prefix('\'').filter(|rest| is_formula(rest)).unwrap_or(name)
 }

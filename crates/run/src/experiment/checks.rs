@@ -1,6 +1,14 @@
 //! What the types of the experiment file cannot rule out. A complaint names its key, so that the reader can point at it.
 
+use crate::memory::{complaint as complaint_about, product};
+
 use super::{Adam, Data, Experiment, Lbfgs, Momentum, Network, Output, ScalingChoice, TaskName, Training};
+
+/// Most sequences and steps that a task is asked for, most units of a group, and the longest delay.
+const MOST_SEQUENCES: usize = 1_000_000;
+const MOST_STEPS: usize = 1_000_000_000;
+const MOST_UNITS: usize = 1_000_000;
+const MOST_DELAY: usize = 1_000_000;
 
 /// A value that will not do.
 #[derive(Debug, PartialEq)]
@@ -110,6 +118,12 @@ fn check_data(data: &Data) -> Check {
     }
     must(data.sequences != Some(0), &["data", "sequences"], 0, "at least 1")?;
     must(data.steps != Some(0), &["data", "steps"], 0, "at least 1 more than the delay")?;
+    let (sequences, steps) = (data.sequences.unwrap_or(1), data.steps.unwrap_or(1));
+    must(sequences <= MOST_SEQUENCES, &["data", "sequences"], sequences, "at most 1e6")?;
+    must(steps <= MOST_STEPS, &["data", "steps"], steps, "at most 1e9")?;
+    if let Some(amounts) = complaint_about(product(&[sequences, steps, 2 * size_of::<f64>()])) {
+        return complaint(&["data", "steps"], format!("{sequences} sequences of {steps} steps {amounts}"), "fewer");
+    }
     let path = ["data", "scaling"];
     match &data.scaling {
         Some(ScalingChoice::Ranges(scaling)) => {
@@ -136,7 +150,7 @@ fn check_data(data: &Data) -> Check {
 }
 
 fn check_network(network: &Network) -> Check {
-    must(network.delay >= 1, &["network", "delay"], network.delay, "at least 1 step")?;
+    must((1..=MOST_DELAY).contains(&network.delay), &["network", "delay"], network.delay, "1 to 1e6 steps")?;
     not_negative(&["network", "variance_floor"], network.variance_floor)?;
     positive(&["network", "initial_state_variance"], network.initial_state_variance)?;
     let groups = ["network", "groups"];
@@ -146,9 +160,15 @@ fn check_network(network: &Network) -> Check {
         must(!group.name.is_empty(), &["network", "groups", "", "name"], "empty", "a name")?;
         let twice = network.groups[..index].iter().any(|other| other.name == group.name);
         must(!twice, &key("name"), format!("`{}` twice", group.name), "a name of its own for each group")?;
-        must(group.units >= 1, &key("units"), group.units, "at least 1 unit")?;
+        must((1..=MOST_UNITS).contains(&group.units), &key("units"), group.units, "1 to 1e6 units")?;
         let tau = group.time_constant;
         must(tau >= 1.0 && tau.is_finite(), &key("time_constant"), tau, "a number of steps, at least 1")?;
+    }
+    // Weights, their gradient, the optimiser's two memories and the best network.
+    let units: Vec<usize> = network.groups.iter().map(|group| group.units).collect();
+    let all = units.iter().try_fold(0_usize, |sum, units| sum.checked_add(*units)).unwrap_or(usize::MAX);
+    if let Some(amounts) = complaint_about(product(&[all, all, 5 * size_of::<f64>()])) {
+        return complaint(&groups, format!("a network of {all} context units {amounts}"), "fewer units");
     }
     let driven = network.groups.iter().any(|group| group.drives_output);
     must(driven, &groups, "without a group that drives the outputs", "drives_output = true in one group")

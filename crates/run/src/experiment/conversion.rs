@@ -67,6 +67,11 @@ impl Data {
         for file in self.files.iter_mut().flatten() {
             let path: PathBuf = folder.join(&*file);
             *file = std::path::absolute(&path).map_err(|error| Failure::disk("find", &path, error))?;
+            if file.to_str().is_none() {
+                // The run notes the paths of its data as text.
+                let message = format!("the path {} is not UTF-8", file.display());
+                return Err(Failure::input(message, "rename the folder or the file, or link to it by another name"));
+            }
         }
         let by_default = match self.task {
             Some(task) if !task.has_robot() => ScalingName::None,

@@ -16,7 +16,13 @@ use crate::failure::{Failure, Result};
 /// # Errors
 /// [`Failure::Disk`]; [`Failure::Input`] with the line of the file, or the option, that is wrong.
 pub fn read(path: &Path, overrides: &[Override]) -> Result<Experiment> {
-    let text = std::fs::read_to_string(path).map_err(|error| Failure::disk("read", path, error))?;
+    let bytes = std::fs::read(path).map_err(|error| Failure::disk("read", path, error))?;
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let at = error.utf8_error().valid_up_to();
+        let line = error.as_bytes()[..at].iter().filter(|byte| **byte == b'\n').count() + 1;
+        let message = format!("{} is not text: byte {} (line {line}) is not UTF-8", path.display(), at + 1);
+        Failure::input(message, "save the file as UTF-8")
+    })?;
     read_text(&path.display().to_string(), &text, overrides)
 }
 

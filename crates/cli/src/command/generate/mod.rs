@@ -12,6 +12,7 @@ use serde_json::{Value, json};
 
 use crate::args::{Part, Shared};
 use crate::output;
+use crate::outputs::check_distinct;
 use scrnn_data::{self as files, Field};
 use scrnn_run::failure::{Ending, Failure, Result};
 use scrnn_run::trained::Trained;
@@ -56,13 +57,13 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     initial_state: Option<PathBuf>,
     /// Number of steps [default: as many as the data have]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = crate::args::count(1, 1_000_000_000))]
     steps: Option<usize>,
     /// No noise: what is fed back, and the sample, is the predicted mean
     #[arg(long)]
     no_noise: bool,
     /// Number of times that each sequence is generated, with noise of its own
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     samples: u32,
     /// Seed of the noise
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -100,6 +101,9 @@ enum Mode {
 
 /// Generates.
 pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
+    let inputs = [Some(arguments.run.as_path()), arguments.initial_state.as_deref(), arguments.data.as_deref()];
+    let named = [("RUN", inputs[0]), ("--initial-state", inputs[1]), ("--data", inputs[2])];
+    check_distinct(&[("--out", arguments.out.as_deref())], &named)?;
     let trained = Trained::open(&arguments.run, arguments.best)?;
     let feedback = feedback(arguments, &trained.checkpoint)?;
     let rows = starts::rows(

@@ -9,6 +9,7 @@ use scrnn::topology::Group;
 use super::Arguments;
 use scrnn_data as files;
 use scrnn_run::failure::{Failure, Result};
+use scrnn_run::memory::{self, product};
 use scrnn_run::trained::Trained;
 
 /// One sequence to generate.
@@ -64,6 +65,10 @@ pub fn rows((arguments, trained): (&Arguments, &Trained), threads: usize, sensin
         let help = "say with --steps how many to generate";
         return Err(Failure::input(format!("the number of steps of sequence {} is not known", row.name), help));
     }
+    let wide = 3 * checkpoint.channels.len() + checkpoint.topology.context_units();
+    let longest = rows.iter().map(|row| row.steps).max().unwrap_or(0);
+    let bytes = product(&[rows.len(), arguments.samples as usize, longest, wide, size_of::<f64>()]);
+    memory::check("what is to be generated", bytes)?;
     if arguments.samples > 1 {
         let repeat = |row: &Row| {
             let row = row.clone();

@@ -22,6 +22,7 @@ use serde::Serialize;
 use crate::args::{Part, Shared};
 use crate::command::generate::unit_names;
 use crate::output;
+use crate::outputs::check_distinct;
 use online::{How, Online};
 use scrnn_data::{self as files, Field};
 use scrnn_report::Table;
@@ -40,7 +41,17 @@ const NAMED: usize = 3;
 ///
 /// With --online the network follows the samples one by one instead. Whenever one arrives, the internal state at the tail
 /// of a sliding window climbs the likelihood of the window, and the next samples are predicted anew. DATA `-` reads
-/// lines from the standard input and answers each at once.
+/// lines from the standard input and answers each at once. A line holds a number for each channel, between commas, semicolons,
+/// tabs or spaces, in the network's order or in that of a first line with all the names; or it is a JSON object with the
+/// channels as keys, or with the lists `name` and `position`. A blank line ends a sequence, a last line without its end is
+/// no sample. An empty field, null, a number that is not finite, and one that lies 1e12 times as far out as anything that was
+/// learned are missing: a warning goes to stderr, and the network's own prediction stands in for that value.
+///
+/// With --json each answer is an object: `sample` (its number, from 1), `mean` and `variance` of the next sample in the data's
+/// units (empty before the network's delay is over), `forecast` (the means of the --ahead samples after it), `ln_likelihood`
+/// (nats per step and regarded channel of the window, before and after the regression; null where there was none),
+/// `milliseconds`, and `missing` (names, if any). With --full it holds `iterations`, `error` and `view` (`from`, `smoothed`,
+/// `contexts`, `predicted`, `variance`) instead.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -58,16 +69,16 @@ pub struct Arguments {
     #[command(flatten)]
     part: Part,
     /// Number of starts for each sequence
-    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     starts: u32,
     /// Number of updates from each start
-    #[arg(long, value_name = "N", default_value_t = 300)]
+    #[arg(long, value_name = "N", default_value_t = 300, value_parser = clap::value_parser!(u64).range(0..=1_000_000))]
     epochs: u64,
     /// Recognise from the first N samples, and complete the rest
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = crate::args::count(1, 1_000_000_000))]
     observed: Option<usize>,
     /// Rate of the ascent [default: one that suits most networks]
-    #[arg(long, value_name = "RATE")]
+    #[arg(long, value_name = "RATE", value_parser = crate::args::positive(1e6))]
     rate: Option<f64>,
     /// Seed of the random starts
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -130,6 +141,10 @@ struct Tried {
 
 /// Recognises.
 pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
+    check_distinct(
+        &[("--out", arguments.out.as_deref()), ("--completed", arguments.completed.as_deref())],
+        &[("DATA", Some(&arguments.data)), ("RUN", Some(&arguments.run))],
+    )?;
     if arguments.online.wanted() {
         let Arguments { run, data, part, best, rate, out, json, regression, .. } = arguments;
         let how = How { regression, rate: *rate };

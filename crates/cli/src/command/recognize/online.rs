@@ -6,6 +6,7 @@ use std::path::Path;
 
 use clap::Args;
 use scrnn::dataset::{Dataset, Sequence};
+use scrnn::engine::Engine;
 use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions, Regression};
 use serde::Serialize;
 use serde_json::json;
@@ -15,11 +16,12 @@ use super::regression::RegressionArguments;
 use super::stream::{Arrival, Stream};
 use crate::args::{Part, Shared};
 use crate::command::generate::unit_names;
-use crate::output;
+use crate::output::{self, Reader};
 use scrnn_data::{self as files, Field};
 use scrnn_report::Table;
 use scrnn_run::failure::{Ending, Failure, Result};
-use scrnn_run::trained::Trained;
+use scrnn_run::memory::{self, product};
+use scrnn_run::trained::{TOO_FAR, Trained};
 
 /// How to follow.
 #[derive(Debug, Args)]
@@ -29,7 +31,7 @@ pub struct Online {
     #[arg(long, conflicts_with_all = ["observed", "completed", "starts", "epochs", "seed"])]
     online: bool,
     /// Samples to predict beyond the next one
-    #[arg(long, value_name = "N", default_value_t = 10, requires = "online")]
+    #[arg(long, value_name = "N", default_value_t = 10, requires = "online", value_parser = crate::args::count(0, 100_000))]
     ahead: usize,
     /// Channels whose input is the network's own prediction, as those of an arm that it moves
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', requires = "online")]
@@ -43,6 +45,9 @@ pub struct Online {
     /// In the JSON object, show window and future at these samples, counted from 1
     #[arg(long, value_name = "K,...", value_delimiter = ',', requires_all = ["online", "json"])]
     at: Vec<usize>,
+    /// In the lines of a stream, show the whole window, its contexts and the number of updates as well
+    #[arg(long, requires_all = ["online", "json"])]
+    full: bool,
 }
 
 impl Online {
@@ -55,6 +60,9 @@ impl Online {
         let channels = &trained.checkpoint.channels;
         let mut options = how.regression.options(how.rate, channels.len())?;
         options.ahead = self.ahead;
+        let units = trained.checkpoint.topology.context_units();
+        let bytes = product(&[options.window + options.ahead, 2 * units + 4 * channels.len(), size_of::<f64>()]);
+        memory::check("a window of that length", bytes)?;
         for (names, shares) in
             [(&self.closed_channels, &mut options.sensed), (&self.masked_channels, &mut options.mask)]
         {
@@ -107,6 +115,20 @@ struct Observed {
     view: Option<View>,
 }
 
+/// What a stream is answered with, in the data's units; the keys are explained in the help.
+#[derive(Debug, Serialize)]
+struct Answer<'a> {
+    sample: usize,
+    mean: Vec<f64>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    variance: Vec<f64>,
+    forecast: Vec<Vec<f64>>,
+    ln_likelihood: Option<[f64; 2]>,
+    milliseconds: f64,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    missing: Vec<&'a str>,
+}
+
 /// The network's view at one moment, in the data's units: rows of channels, or of context units.
 #[derive(Debug, Serialize)]
 struct View {
@@ -153,21 +175,37 @@ struct Session<'a> {
     deadline: Deadline,
     taken: usize,
     scaled: Vec<f64>,
+    /// Channels whose values are not there in the sample that came last.
+    missing: Vec<usize>,
+    /// Channels whose errors are regressed on.
+    heeded: usize,
 }
 
 impl<'a> Session<'a> {
-    fn new(online: &Online, how: &How<'_>, trained: &'a Trained, shared: &Shared) -> Result<Self> {
+    fn new(online: &Online, how: &How<'_>, trained: &'a Trained, engine: &Engine) -> Result<Self> {
         let options = online.options(how, trained)?;
         let start = online.start(trained)?;
-        let regression = ErrorRegression::new(&trained.network(), start, options, &shared.engine()?)?;
+        let heeded = options.mask.iter().filter(|share| **share > 0.0).count();
+        let regression = ErrorRegression::new(&trained.network(), start, options, engine)?;
         let (deadline, scaled) = (how.regression.clock()?, vec![0.0; trained.checkpoint.channels.len()]);
-        Ok(Self { trained, regression, deadline, taken: 0, scaled })
+        Ok(Self { trained, regression, deadline, taken: 0, scaled, missing: Vec::new(), heeded })
     }
 
     fn observe(&mut self, sample: &[f64]) -> Result<Regression> {
         let scaling = &self.trained.checkpoint.scaling;
+        self.missing.clear();
+        let predicts = self.predicts();
         for (channel, (scaled, raw)) in self.scaled.iter_mut().zip(sample).enumerate() {
-            *scaled = scaling.to_scaled(channel, *raw);
+            let value = scaling.to_scaled(channel, *raw);
+            if value.is_finite() && value.abs() < TOO_FAR {
+                *scaled = value;
+                continue;
+            }
+            self.missing.push(channel);
+            // The prediction stands in; before there is one, the value that came last, and 0 before there was any.
+            if predicts {
+                *scaled = self.regression.mean()[channel];
+            }
         }
         self.taken += 1;
         let (regression, scaled) = (&mut self.regression, &self.scaled);
@@ -175,9 +213,9 @@ impl<'a> Session<'a> {
     }
 
     fn told(&self, done: &Regression, view: bool, ahead: usize) -> Observed {
-        let values = (done.steps * self.scaled.len()) as f64;
+        let values = (done.steps * self.heeded) as f64;
         let has_variance = self.trained.checkpoint.topology.has_variance();
-        let regressed = done.iterations > 0;
+        let regressed = done.iterations > 0 && self.heeded > 0;
         Observed {
             sample: self.taken,
             iterations: done.iterations,
@@ -188,14 +226,49 @@ impl<'a> Session<'a> {
         }
     }
 
+    /// The next sample as predicted, as a row of a table.
+    fn row(&self, done: &Regression) -> String {
+        let milliseconds = 1e3 * self.deadline.last().as_secs_f64();
+        let mut line = format!("{},{},{milliseconds:.3}", self.taken, done.iterations);
+        for (channel, &y) in self.regression.mean().iter().enumerate() {
+            match self.predicts() {
+                true => write!(line, ",{:?}", self.trained.checkpoint.scaling.to_raw(channel, y)),
+                false => line.write_char(','),
+            }
+            .expect("a string takes all");
+        }
+        line.push('\n');
+        line
+    }
+
+    /// Takes nothing from the window but the sum of its likelihood.
+    fn answer(&self, done: &Regression, ahead: usize) -> Answer<'a> {
+        let Observed { sample, ln_likelihood, milliseconds, .. } = self.told(done, false, ahead);
+        let (scaling, channels) = (&self.trained.checkpoint.scaling, &self.trained.checkpoint.channels);
+        let raw = |mean: &[f64]| mean.iter().enumerate().map(|(i, &y)| scaling.to_raw(i, y)).collect::<Vec<_>>();
+        let (mut mean, mut variance, mut forecast) = (Vec::new(), Vec::new(), Vec::new());
+        if self.predicts() {
+            mean = raw(self.regression.mean());
+            let v = self.regression.variance().iter().enumerate();
+            variance = v.map(|(i, &v)| scaling.variance_to_raw(i, v)).collect();
+            forecast = (1..=ahead).map(|k| raw(self.regression.forecast_mean(k))).collect();
+        }
+        let missing = self.missing.iter().map(|&channel| channels[channel].as_str()).collect();
+        Answer { sample, mean, variance, forecast, ln_likelihood, milliseconds, missing }
+    }
+
+    /// Whether enough samples came for a prediction of the next one.
+    fn predicts(&self) -> bool {
+        self.taken >= self.trained.checkpoint.topology.delay()
+    }
+
     fn view(&self, ahead: usize) -> View {
         let scaling = &self.trained.checkpoint.scaling;
         let raw = |mean: &[f64]| mean.iter().enumerate().map(|(i, &y)| scaling.to_raw(i, y)).collect::<Vec<_>>();
         let raw_variance =
             |v: &[f64]| v.iter().enumerate().map(|(i, &v)| scaling.variance_to_raw(i, v)).collect::<Vec<_>>();
         let window = self.regression.window();
-        let predicts = self.taken >= self.trained.checkpoint.topology.delay();
-        let future = if predicts { 0..ahead + 1 } else { 0..0 };
+        let future = if self.predicts() { 0..ahead + 1 } else { 0..0 };
         let has_variance = self.trained.checkpoint.topology.has_variance();
         View {
             from: self.taken + 1 - window,
@@ -228,9 +301,10 @@ pub fn run(
     let data = files::read_part(data, &part.of(data, trained.selection()))
         .map_err(Failure::from)
         .and_then(|set| trained.fitted(set, data))?;
+    let engine = shared.engine()?;
     let mut followed = Vec::new();
     for sequence in data.sequences() {
-        followed.push(follow(online, how, &trained, sequence, shared)?);
+        followed.push(follow(online, how, &trained, sequence, &engine)?);
     }
     if let Some(path) = out {
         write(path, &trained, &followed)?;
@@ -243,8 +317,8 @@ pub fn run(
     Ok(Ending::Done)
 }
 
-fn follow(online: &Online, how: &How<'_>, trained: &Trained, sequence: &Sequence, shared: &Shared) -> Result<Followed> {
-    let mut session = Session::new(online, how, trained, shared)?;
+fn follow(online: &Online, how: &How<'_>, trained: &Trained, sequence: &Sequence, engine: &Engine) -> Result<Followed> {
+    let mut session = Session::new(online, how, trained, engine)?;
     let (scaling, delay) = (&trained.checkpoint.scaling, trained.checkpoint.topology.delay());
     let (mut steps, mut rows) = (Vec::with_capacity(sequence.len()), Rows::default());
     let (mut squares, mut values) = (0.0, 0_usize);
@@ -285,39 +359,62 @@ fn follow(online: &Online, how: &How<'_>, trained: &Trained, sequence: &Sequence
     })
 }
 
-/// One line of output for each line of input.
+/// One line of output for each line of input. Ends when whoever reads it has left.
 fn stream(online: &Online, how: &How<'_>, trained: &Trained, as_json: bool, shared: &Shared) -> Result<Ending> {
     let channels = &trained.checkpoint.channels;
+    let engine = shared.engine()?;
     let mut lines = Stream::new(BufReader::new(io::stdin()), channels);
-    let mut session = Session::new(online, how, trained, shared)?;
+    let mut session = Session::new(online, how, trained, &engine)?;
+    let mut warned = Warned::default();
+    let mut reader = Reader::Listens;
     if !as_json {
-        output::print(&format!("sample,iterations,milliseconds,{}\n", channels.join(",")))?;
+        reader = output::offer(&format!("sample,iterations,milliseconds,{}\n", channels.join(",")))?;
     }
-    while let Some(arrival) = lines.next()? {
-        let Arrival::Sample(sample) = arrival else {
-            session = Session::new(online, how, trained, shared)?;
-            continue;
+    while reader == Reader::Listens {
+        let sample = match lines.next()? {
+            None => break,
+            Some(Arrival::Sample(sample)) => sample,
+            Some(Arrival::Gap) => {
+                if session.taken > 0 {
+                    let deadline = session.deadline;
+                    session = Session { deadline, ..Session::new(online, how, trained, &engine)? };
+                }
+                continue;
+            }
         };
         let done = session.observe(&sample)?;
-        let told = session.told(&done, true, online.ahead);
-        if as_json {
-            output::print_json_line(&told)?;
-            continue;
+        for &channel in &session.missing {
+            warned.missing(lines.line_number(), &channels[channel], sample[channel], shared);
         }
-        let mut line = format!("{},{},{:.3}", told.sample, told.iterations, told.milliseconds);
-        let next = told.view.as_ref().and_then(|view| view.predicted.first());
-        for channel in 0..channels.len() {
-            match next {
-                Some(next) => write!(line, ",{:?}", next[channel]).expect("a string takes all"),
-                None => line.push(','),
-            }
-        }
-        output::print(&(line + "\n"))?;
+        reader = match (as_json, online.full) {
+            (true, true) => output::offer_json_line(&session.told(&done, true, online.ahead))?,
+            (true, false) => output::offer_json_line(&session.answer(&done, online.ahead))?,
+            (false, _) => output::offer(&session.row(&done))?,
+        };
+    }
+    if lines.is_unfinished() {
+        shared.say("the last line of the stream has no end: it is no sample");
     }
     if let Some(latency) = session.deadline.latency() {
         shared.say(told_latency(&latency));
     }
     Ok(Ending::Done)
+}
+
+/// Warnings about values that are taken as missing: the 1st, 2nd, 4th, 8th, ...
+#[derive(Debug, Default)]
+struct Warned(u64);
+
+impl Warned {
+    fn missing(&mut self, line: usize, channel: &str, value: f64, shared: &Shared) {
+        self.0 += 1;
+        if self.0.is_power_of_two() {
+            let what =
+                if value.is_finite() { format!("{value:e}, far beyond what was learned") } else { "missing".into() };
+            let so_far = if self.0 > 1 { format!(" ({} values so far)", self.0) } else { String::new() };
+            shared.say(format_args!("line {line}, {channel} is {what}: the network's prediction stands in{so_far}",));
+        }
+    }
 }
 
 /// Each sample as predicted just before it came and as the window has it afterwards, in the data's units.
@@ -354,7 +451,7 @@ fn table(followed: &[Followed]) -> String {
             one.ln_likelihood.map_or("-".to_owned(), |found| pair(found, 3)),
             format!("{:.3e}", one.prediction_error),
         ];
-        if let Some(Latency { median, p99, longest, missed }) = one.latency {
+        if let Some(Latency { median, p99, longest, missed, .. }) = one.latency {
             row.extend([median, p99, longest].map(|ms| format!("{ms:.3}")));
             row.extend(missed.map(|missed| missed.to_string()));
         }
@@ -364,7 +461,7 @@ fn table(followed: &[Followed]) -> String {
 }
 
 fn told_latency(latency: &Latency) -> String {
-    let Latency { median, p99, longest, missed } = latency;
+    let Latency { median, p99, longest, missed, .. } = latency;
     let missed = missed.map_or(String::new(), |missed| format!(", {missed} missed the deadline"));
     format!("{median:.3} ms a sample, 99 % within {p99:.3} ms, longest {longest:.3} ms{missed}")
 }

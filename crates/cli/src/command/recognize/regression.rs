@@ -13,10 +13,10 @@ use scrnn_run::failure::{Failure, Result};
 #[command(next_help_heading = "Error regression")]
 pub struct RegressionArguments {
     /// Steps in the sliding window [default: 50]
-    #[arg(long, value_name = "W")]
+    #[arg(long, value_name = "W", value_parser = crate::args::count(1, 1_000_000))]
     window: Option<usize>,
     /// Updates of the internal state for each sample [default: 10]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = crate::args::count(0, 1_000_000))]
     steps: Option<usize>,
     /// How the internal state is moved [default: what is safe for most networks]
     #[arg(long, value_enum)]

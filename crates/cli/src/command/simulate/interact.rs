@@ -14,6 +14,7 @@ use serde_json::json;
 use crate::args::Shared;
 use crate::command::recognize::{Latency, RegressionArguments};
 use crate::output;
+use crate::outputs::check_distinct;
 use scrnn_data::{self as files, Field};
 use scrnn_report::Table;
 use scrnn_run::failure::{Ending, Failure, Result};
@@ -50,7 +51,7 @@ pub struct Arguments {
     #[arg(long)]
     ers: bool,
     /// Rate of the ascent [default: one that suits most networks]
-    #[arg(long, value_name = "RATE")]
+    #[arg(long, value_name = "RATE", value_parser = crate::args::positive(1e6))]
     rate: Option<f64>,
     #[command(flatten)]
     regression: RegressionArguments,
@@ -81,6 +82,8 @@ struct Trial {
 
 /// Simulates.
 pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
+    let outputs = [("--out", arguments.out.as_deref()), ("--mcap", arguments.mcap.as_deref())];
+    check_distinct(&outputs, &[("RUN", Some(&arguments.run))])?;
     let trained = Trained::open(&arguments.run, arguments.best)?;
     let checkpoint = &trained.checkpoint;
     if checkpoint.channels.len() != CHANNELS.len() {

@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::args::Shared;
 use crate::output;
+use crate::outputs::check_distinct;
 use scrnn_data as files;
 use scrnn_report::Table;
 use scrnn_run::experiment::Experiment;
@@ -41,7 +42,7 @@ pub struct Arguments {
     #[arg(long, value_name = "1|2|3|Y", default_value = "1", allow_hyphen_values = true)]
     position: Place,
     /// Put the sphere elsewhere when this many samples are over; a sample lasts half a second
-    #[arg(long, value_name = "STEP", requires = "to")]
+    #[arg(long, value_name = "STEP", requires = "to", value_parser = crate::args::count(0, 1_000_000_000))]
     shift_at: Option<usize>,
     /// Where to put it
     #[arg(long, value_name = "1|2|3|Y", requires = "shift_at", allow_hyphen_values = true)]
@@ -112,6 +113,7 @@ struct Outcome<'a> {
 
 /// Simulates.
 pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
+    check_distinct(&[("--mcap", arguments.mcap.as_deref())], &[("RUN", Some(&arguments.run))])?;
     let trained = Trained::open(&arguments.run, arguments.best)?;
     let checkpoint = &trained.checkpoint;
     if checkpoint.channels != REACHING {

@@ -1,0 +1,143 @@
+//! Numbers that people may type: each option and key at the ends of what can be written.
+
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use super::numbers_table::OPTIONS;
+use super::{Place, SINE};
+
+const VALUES: [&str; 9] =
+    ["0", "1", "-1", "2147483648", "4294967296", "9223372036854775808", "18446744073709551615", "1e308", "NaN"];
+
+/// Keys of the experiment file.
+const KEYS: [&str; 22] = [
+    "seed",
+    "data.seed",
+    "data.sequences",
+    "data.steps",
+    "network.delay",
+    "network.variance_floor",
+    "network.initial_state_variance",
+    "network.groups.context.units",
+    "network.groups.context.time_constant",
+    "training.epochs",
+    "training.momentum.rate",
+    "training.momentum.momentum",
+    "training.momentum.rate_initial",
+    "training.adam.rate",
+    "training.adam.clip_norm",
+    "training.adam.batch_size",
+    "training.lbfgs.share",
+    "training.lbfgs.memory",
+    "training.on_divergence.recoveries",
+    "output.history_every",
+    "output.checkpoint_every",
+    "output.checkpoint_seconds",
+];
+
+/// Runs a line for so long at most; the exit code, unless it had to be stopped, and what it said.
+fn ends(place: &Place, line: &str, within: Duration) -> (Option<i32>, String) {
+    let log = place.path("log");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_scrnn"));
+    command.current_dir(&place.0).args(line.split_whitespace()).stdin(Stdio::null()).stdout(Stdio::null());
+    let mut child = command.stderr(std::fs::File::create(&log).unwrap()).spawn().unwrap();
+    let begun = Instant::now();
+    let code = loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            break Some(status.code().unwrap_or(-1));
+        }
+        if begun.elapsed() > within {
+            child.kill().unwrap();
+            child.wait().unwrap();
+            break None;
+        }
+        std::thread::sleep(Duration::from_millis(3));
+    };
+    (code, String::from_utf8_lossy(&std::fs::read(&log).unwrap()).into_owned())
+}
+
+fn check(place: &Place, line: &str, codes: &[i32], is_long: bool) {
+    let within = if is_long { Duration::from_millis(500) } else { Duration::from_secs(60) };
+    let (code, told) = ends(place, line, within);
+    assert!(!told.contains("panicked") && !told.contains("allocation"), "{line}: {told}");
+    match code {
+        Some(code) => assert!(codes.contains(&code), "{line}: exit code {code}, {told}"),
+        None => assert!(is_long, "{line} does not end: {told}"),
+    }
+}
+
+#[test]
+fn every_numeric_option_takes_a_value_or_refuses_it_and_never_panics() {
+    let place = Place::with(&SINE.replace("epochs = 120", "epochs = 5"));
+    place.ok("train sine.toml --out run -q");
+    place.ok("data sinusoid --steps 20 --seed 3 --out new.csv -q");
+    for (_, option, line) in OPTIONS {
+        for value in VALUES {
+            // Whoever asks for 2^31 epochs of training gets them.
+            check(&place, &format!("{line} --{option}={value}"), &[0, 2], *option == "epochs");
+        }
+    }
+}
+
+#[test]
+fn every_numeric_key_takes_a_value_or_is_refused_and_never_panics() {
+    let place = Place::with(&SINE.replace("epochs = 120", "epochs = 3"));
+    for key in KEYS {
+        for value in VALUES {
+            let value = if value == "NaN" { "nan" } else { value };
+            let optimiser = if key.contains("adam") { "--set training.optimiser=adam" } else { "" };
+            let line = format!("train sine.toml --out t --overwrite {optimiser} --set {key}={value}");
+            // A rate of 1e308 may be a divergence.
+            check(&place, &line, &[0, 2, 3], key == "training.epochs");
+        }
+    }
+}
+
+#[test]
+fn what_does_not_fit_into_memory_is_refused_with_the_amount() {
+    let place = Place::with(SINE);
+    place.ok("train sine.toml --out run --epochs 1 -q");
+    for line in [
+        "data sinusoid --sequences 1000000 --steps 1000000000",
+        "generate run --steps 1000000000 --samples 1000000",
+        "train sine.toml --out t --set network.groups.context.units=1000000",
+    ] {
+        let (_, told) = place.fails(2, line);
+        assert!(told.contains("needs ") && told.contains("this machine has"), "{line}: {told}");
+    }
+    let (_, told) = place.fails(2, "inspect run --threads 1025");
+    assert!(told.contains("from 0 to 1024"), "{told}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn paths_and_bytes_that_are_no_text_are_refused_or_cut_with_a_word() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    let place = Place::new();
+    let folder = place.0.path().join(OsStr::from_bytes(b"nu\xff"));
+    std::fs::create_dir(&folder).unwrap();
+    std::fs::write(folder.join("d.csv"), "a,b\n1,2\n2,3\n3,1\n2,2\n").unwrap();
+    let experiment = "name = \"f\"\n[data]\nfiles = [\"d.csv\"]\n[[network.groups]]\nname = \"c\"\nunits = 3\n\
+                      time_constant = 2.0\n[training]\nepochs = 3\noptimiser = \"adam\"\n";
+    std::fs::write(folder.join("f.toml"), experiment).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_scrnn"));
+    let output = command.current_dir(&place.0).arg("train").arg(folder.join("f.toml")).output().unwrap();
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(2) && told.contains("is not UTF-8"), "{told}");
+    place.write("bad.toml", b"name = \"\xff\"\n");
+    let (_, told) = place.fails(2, "train bad.toml");
+    assert!(told.contains("byte 9 (line 1) is not UTF-8"), "{told}");
+    // One bad byte in the history is said, cut, and gone on from.
+    place.write("sine.toml", SINE);
+    place.ok("train sine.toml --out run --epochs 40 -q");
+    let mut history = place.read("run/history.csv");
+    let at = history.len() * 3 / 4;
+    history[at] = 0xff;
+    place.write("run/history.csv", &history);
+    let output = place.run("train sine.toml --out run --resume --epochs 60");
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(0) && told.contains("is damaged"), "{told}");
+    let epochs = super::epochs(&place.text("run/history.csv"));
+    assert!(epochs.last() == Some(&60) && epochs.windows(2).all(|pair| pair[0] < pair[1]), "{epochs:?}");
+}
