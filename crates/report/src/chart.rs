@@ -88,9 +88,9 @@ pub(super) fn on_white(svg: &str) -> String {
 /// A text as a field of a CSV file.
 pub(super) fn csv_field(text: &str) -> String {
     // A spreadsheet would take these for formulas, and run what they say.
-    let formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']) && text != "-" && !super::page::is_number(text);
+    let formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']) && text != "-" && !super::words::is_number(text);
     let formula = if formula { "'" } else { "" };
-    let text = &format!("{formula}{}", super::page::printable(text));
+    let text = &format!("{formula}{}", super::escape::printable(text));
     match text.contains([',', '"', '\n', '\'', '\t', '\r']) {
         true => format!("\"{}\"", text.replace('"', "\"\"")),
         false => text.to_owned(),
@@ -245,7 +245,7 @@ impl Chart {
             self.draw(&root, legend).expect("a string takes all");
             root.present().expect("a string takes all");
         }
-        let svg = super::page::printable(&svg);
+        let svg = super::escape::printable(&svg);
         let body = svg.split_once(">\n").map_or("", |(_, body)| body);
         let dashed = format!("stroke=\"{}\"", Tone::Truth.hex());
         let body = body.replace(&dashed, &format!("{dashed} stroke-dasharray=\"14 9\""));

@@ -6,6 +6,7 @@ use super::chart::{Chart, on_white, themed};
 use super::escape::escaped;
 #[cfg(feature = "scenes")]
 use super::picture::Pictures;
+use super::words::is_number;
 
 /// The page's file.
 pub const PAGE: &str = "report.html";
@@ -231,12 +232,6 @@ impl Figure {
         *out += &format!("<span class=\"files\">{folder}/{0}.svg, {folder}/{0}.csv</span>", escaped(file));
         *out += "</figcaption>\n</figure>\n";
     }
-}
-
-/// Whether a cell is a number, with or without its spread or a percent sign, or a dash in the place of one.
-pub(super) fn is_number(cell: &str) -> bool {
-    let number = cell.trim_end_matches([' ', '%']).split(" \u{b1} ").next().unwrap_or(cell);
-    !number.is_empty() && number.parse::<f64>().is_ok() || cell == "\u{2013}"
 }
 
 #[cfg(test)]

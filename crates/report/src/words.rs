@@ -13,6 +13,12 @@ pub fn in_words(duration: Duration) -> String {
     }
 }
 
+/// Whether a cell is a number, with or without its spread or a percent sign, or a dash in the place of one.
+pub(super) fn is_number(cell: &str) -> bool {
+    let number = cell.trim_end_matches([' ', '%']).split(" \u{b1} ").next().unwrap_or(cell);
+    !number.is_empty() && number.parse::<f64>().is_ok() || cell == "\u{2013}"
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
