@@ -1,4 +1,4 @@
-//! What of the curves is compared with the thesis, and the goals (3.2, 6.2.3).
+//! What of the curves is compared with the thesis, and the goals (thesis 3.2, 6.2.3).
 
 use scrnn::analysis::clustering::Clustering;
 

@@ -1,4 +1,4 @@
-//! Figures and tables of the oscillator (3.4).
+//! Figures and tables of the oscillator (thesis 3.4).
 
 use scrnn::analysis::oscillation::Oscillation;
 use scrnn_pages::calibration_blocks;

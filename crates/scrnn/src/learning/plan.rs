@@ -58,7 +58,7 @@ pub enum Optimiser {
 }
 
 /// Gradient ascent with momentum. With T_total steps in all and N_O channels, shared parameters ascend at
-/// alpha / (T_total N_O) and initial states at alpha / N_O (2.7).
+/// alpha / (T_total N_O) and initial states at alpha / N_O (thesis 2.7).
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
