@@ -41,7 +41,7 @@ pub fn learning_curves(file: &str, title: &str, runs: &[(String, &[Row])], floor
     } else {
         "Mean squared error per step and channel, as a power of ten: lower is better."
     };
-    let caption = format!("{caption}{}", told_recoveries(runs));
+    let caption = format!("{caption}{}", recoveries_in_words(runs));
     let y_label = if with_variance { "nll" } else { "log10 of the squared error" };
     let chart =
         Chart { columns: 1, aspect: 2.2, x_label: "epoch".into(), y_label: y_label.into(), panels: vec![panel] };
@@ -49,9 +49,9 @@ pub fn learning_curves(file: &str, title: &str, runs: &[(String, &[Row])], floor
     Block::Figure(Box::new(Figure { file, title, caption, thesis, drawing: chart.into() }))
 }
 
-/// Which runs left their course and were brought back, and when.
-fn told_recoveries(runs: &[(String, &[Row])]) -> String {
-    let mut told = String::new();
+/// Which runs became unstable and were reset to their best network, and when.
+fn recoveries_in_words(runs: &[(String, &[Row])]) -> String {
+    let mut text = String::new();
     for (name, rows) in runs {
         let pairs = rows.iter().zip(rows.iter().skip(1));
         let epochs: Vec<String> =
@@ -59,13 +59,13 @@ fn told_recoveries(runs: &[(String, &[Row])]) -> String {
         let times = rows.last().map_or(0, |row| row.recoveries);
         if times > 0 {
             let list = if epochs.len() > 8 { format!("{}, ...", epochs[..8].join(", ")) } else { epochs.join(", ") };
-            told += &format!(
-                " Of {name}, training left its course {times} times (epochs {list}) and was brought back to the best network, \
-                 each time at half the rate."
+            text += &format!(
+                " Of {name}, training became unstable {times} times (epochs {list}). Each time it went back to the best \
+                 network and on at half the rate."
             );
         }
     }
-    told
+    text
 }
 
 /// The nll beside simple models, and predicted beside observed standard deviations.

@@ -343,7 +343,7 @@ fn drivers(job: &JobResult<Findings>, several: bool) -> Block {
 fn meaning() -> Block {
     Block::Text(format!(
         "Replay plays the mean of the ten demonstrations at the nearest position and does not look at the sphere. GMM/GMR is \
-         Gaussian mixture regression with {} components, as many numbers as the network has: it is told the metronome's phase, \
+         Gaussian mixture regression with {} components, as many numbers as the network has: it gets the metronome's phase, \
          which the network must keep by itself, and where the head looks.",
         super::trials::COMPONENTS
     ))

@@ -178,7 +178,7 @@ pub struct Training {
     /// learned stays the same to the bit.
     #[serde(default)]
     pub recompute: bool,
-    /// What to do when training leaves its course.
+    /// What to do when training becomes unstable: a value is not finite, or the likelihood collapses.
     #[serde(default = "recover")]
     pub on_divergence: OnDivergence,
     /// Options of "momentum".

@@ -206,7 +206,7 @@ impl Driver for MixtureDriver {
         if let Some(random) = &mut self.random {
             let covariance = nalgebra::Matrix4::from_row_slice(&regressed.covariance);
             let z = nalgebra::Vector4::from_fn(|_, _| StandardNormal.sample(random));
-            // Where rounding has spoilt the covariance, its diagonal serves.
+            // Where rounding has left the covariance without a factor, noise is drawn by its diagonal.
             let noise = covariance.cholesky().map_or_else(
                 || z.component_mul(&covariance.diagonal().map(|v| v.max(0.0).sqrt())),
                 |factor| factor.l() * z,
