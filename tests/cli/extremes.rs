@@ -75,10 +75,7 @@ fn a_channel_that_never_changes_is_refused_with_a_reason_or_meets_its_floor() {
     // Both ways out work.
     place.ok("train sine.toml --out part --set data.channels=[\"a\"]");
     let said = place.ok("train sine.toml --out floor --set network.variance_floor=1e-4 --epochs 400");
-    assert!(
-        said.contains("Channel b never changes: its predicted variance comes down to the variance_floor"),
-        "{said}"
-    );
+    assert!(said.contains("Channel b never changes: its predicted variance falls to the variance_floor"), "{said}");
     let generated = place.json("generate floor --no-noise --steps 30 --json");
     let values = numbers(&generated["sequences"][0]["mean"]);
     assert!(values.iter().skip(1).step_by(2).all(|b| (b - 7.25).abs() < 0.5), "{values:?}");

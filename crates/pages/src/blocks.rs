@@ -36,8 +36,8 @@ pub fn learning_curves(file: &str, title: &str, runs: &[(String, &[Row])], floor
         panel.y.1 = panel.y.1.min(top + 0.05 * (top - panel.y.0));
     }
     let caption = if with_variance {
-        "How unexpected each next sample is, in nats per step and channel: lower is better. The entropy of the noise is what \
-         a network that knew the true means and variances would come to; below it, samples are learned by heart."
+        "How unexpected each next sample is, in nats per step and channel: lower is better. The entropy of the noise is the \
+         nll of the true means and variances. Below it, a network has memorised single samples."
     } else {
         "Mean squared error per step and channel, as a power of ten: lower is better."
     };
@@ -120,7 +120,7 @@ pub fn calibration_blocks(assessment: &Assessment) -> Vec<Block> {
         file: "calibration".into(),
         title: "Predicted against observed standard deviation".into(),
         caption: "Steps are put into groups of similar predicted variance; each dot is a group, with the root mean \
-                  square of the errors that came. On the line, predictions are right."
+                  square of its errors. On the line, predictions are right."
             .into(),
         thesis: String::new(),
         drawing: chart.into(),

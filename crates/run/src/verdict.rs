@@ -157,7 +157,7 @@ impl fmt::Display for Verdict {
             )?;
         }
         for channel in &self.still_channels {
-            writeln!(f, "Channel {channel} never changes: its predicted variance comes down to the variance_floor.")?;
+            writeln!(f, "Channel {channel} never changes: its predicted variance falls to the variance_floor.")?;
         }
         match &self.truth {
             Some(truth) => writeln!(f, "{truth}"),

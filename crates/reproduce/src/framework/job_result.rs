@@ -1,4 +1,4 @@
-//! What one job came to: its trainings and its findings.
+//! The results of one job: its trainings and its findings.
 
 use scrnn::learning::Outcome;
 use scrnn_run::training::Training;

@@ -154,7 +154,7 @@ fn comparisons<F>(results: &Results<F>) -> Sheet {
     }
 }
 
-/// Learning curves of every network, and what each training came to.
+/// Learning curves of every network, and the result of each training.
 fn learning<F>(results: &Results<F>, networks: &[Vec<Learned>]) -> Section {
     let mut blocks = Vec::new();
     for condition in &results.conditions {

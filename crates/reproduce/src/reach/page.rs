@@ -305,7 +305,7 @@ fn shifts(findings: &Findings) -> Block {
         caption: "The sphere is put elsewhere while the robot moves".into(),
         head: ["from, mm", "to, mm", "at sample", "samples to the first touch", "touched after that"].map(String::from).to_vec(),
         rows: findings.shifts.iter().map(row).collect(),
-        note: "The first cycle at the new place may come too late, since the arm was already on its way; it is left out of the \
+        note: "The first cycle at the new place may come too late, since the arm was already moving to the old one; it is left out of the \
                last column."
             .into(),
     })

@@ -1,4 +1,4 @@
-//! The experiment file: everything that decides what a training comes to.
+//! The experiment file: everything that decides the result of a training.
 //!
 //! The types here are the file's format. [`read()`] turns a file and `--set` options into an [`Experiment`], checked, with
 //! every default filled in; the run folder keeps it in that form.

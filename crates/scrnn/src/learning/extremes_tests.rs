@@ -217,7 +217,7 @@ fn thousands_of_channels_train() {
 }
 
 #[test]
-fn any_rate_ends_in_a_network_of_numbers() {
+fn any_rate_ends_in_a_network_of_finite_values() {
     for rate in [1e-300, 1e-12, 1.0, 1e3, 1e12, 1e150, 1e300] {
         for optimiser in [
             Optimiser::Momentum(Momentum { rate, ..Momentum::default() }),

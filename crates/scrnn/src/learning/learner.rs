@@ -47,7 +47,7 @@ pub struct EpochReport {
 /// Watches a training, and can stop it.
 pub trait Observer {
     /// Called before each epoch, and after the last: a run of N epochs makes N + 1 calls. `learner` holds what was evaluated (in
-    /// batches, what came out of it): saved here and restored later, a training goes on bit for bit.
+    /// batches, the parameters after it): saved here and restored later, a training goes on bit for bit.
     fn epoch(&mut self, report: &EpochReport, learner: &Learner) -> ControlFlow<()>;
 
     /// Called when a training became unstable and was reset to its best network, before it goes on.
@@ -60,7 +60,7 @@ impl<F: FnMut(&EpochReport, &Learner) -> ControlFlow<()>> Observer for F {
     }
 }
 
-/// How a training ended. Divergence is an outcome and no error: whoever ignores it goes on with a network that never learned.
+/// How a training ended. Divergence is an outcome and no error. A caller that ignores it may use a network that never learned.
 #[must_use = "a training may have diverged or been stopped"]
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {

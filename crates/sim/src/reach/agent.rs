@@ -234,7 +234,7 @@ pub struct Performance {
     pub world: WorldOptions,
 }
 
-/// What a performance came to, sample by sample.
+/// The result of a performance, sample by sample.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Performed {
     /// What the robot sensed: samples x channels, row-major, in rad.
