@@ -65,12 +65,12 @@ pub static STUDIES: [Experiment; 6] = [
     },
     Experiment {
         word: "sinusoid",
-        about: "A sine wave whose noise changes over time (thesis 3.3)",
+        about: "A sine wave whose noise changes over time (3.3)",
         run: |word, options, context| reproduce(word, &sinusoid::Sinusoid, options, context),
     },
     Experiment {
         word: "limit-cycle",
-        about: "An oscillator that is driven by noise which depends on its state (thesis 3.4)",
+        about: "An oscillator that is driven by noise which depends on its state (3.4)",
         run: |word, options, context| reproduce(word, &limit_cycle::LimitCycle, options, context),
     },
     Experiment {
