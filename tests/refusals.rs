@@ -87,7 +87,7 @@ fn learning_and_recognising_ask_for_what_belongs_to_them() {
 }
 
 #[test]
-fn a_recognition_whose_steps_leave_the_numbers_keeps_the_best_start() {
+fn a_recognition_whose_steps_become_non_finite_keeps_the_best_start() {
     let engine = Engine::new(1, InstructionSet::Portable).unwrap();
     let (mut network, states) = network();
     // A variance that follows the context without bounds: far out it overflows.

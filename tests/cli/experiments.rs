@@ -174,7 +174,7 @@ fn every_experiment_that_is_shipped_is_valid() {
 }
 
 #[test]
-fn divergence_is_told_rolled_back_and_saved() {
+fn divergence_is_reported_rolled_back_and_saved() {
     let place = Place::with(SINE);
     let (_, told) =
         place.fails(3, "train sine.toml --set training.momentum.rate=1e9 --set training.on_divergence=stop");

@@ -36,12 +36,12 @@ pub fn learning_curves(file: &str, title: &str, runs: &[(String, &[Row])], floor
         panel.y.1 = panel.y.1.min(top + 0.05 * (top - panel.y.0));
     }
     let caption = if with_variance {
-        "How unexpected each next sample is, in nats per step and channel: lower is better. The entropy of the noise is what \
-         a network that knew the true means and variances would come to; below it, samples are learned by heart."
+        "How unexpected each next sample is, in nats per step and channel: lower is better. The entropy of the noise is the \
+         nll of the true means and variances. Below it, a network has memorised single samples."
     } else {
         "Mean squared error per step and channel, as a power of ten: lower is better."
     };
-    let caption = format!("{caption}{}", told_recoveries(runs));
+    let caption = format!("{caption}{}", recoveries_in_words(runs));
     let y_label = if with_variance { "nll" } else { "log10 of the squared error" };
     let chart =
         Chart { columns: 1, aspect: 2.2, x_label: "epoch".into(), y_label: y_label.into(), panels: vec![panel] };
@@ -49,9 +49,9 @@ pub fn learning_curves(file: &str, title: &str, runs: &[(String, &[Row])], floor
     Block::Figure(Box::new(Figure { file, title, caption, thesis, drawing: chart.into() }))
 }
 
-/// Which runs left their course and were brought back, and when.
-fn told_recoveries(runs: &[(String, &[Row])]) -> String {
-    let mut told = String::new();
+/// Which runs became unstable and were reset to their best network, and when.
+fn recoveries_in_words(runs: &[(String, &[Row])]) -> String {
+    let mut text = String::new();
     for (name, rows) in runs {
         let pairs = rows.iter().zip(rows.iter().skip(1));
         let epochs: Vec<String> =
@@ -59,13 +59,13 @@ fn told_recoveries(runs: &[(String, &[Row])]) -> String {
         let times = rows.last().map_or(0, |row| row.recoveries);
         if times > 0 {
             let list = if epochs.len() > 8 { format!("{}, ...", epochs[..8].join(", ")) } else { epochs.join(", ") };
-            told += &format!(
-                " Of {name}, training left its course {times} times (epochs {list}) and was brought back to the best network, \
-                 each time at half the rate."
+            text += &format!(
+                " Of {name}, training became unstable {times} times (epochs {list}). Each time it went back to the best \
+                 network and on at half the rate."
             );
         }
     }
-    told
+    text
 }
 
 /// The nll beside simple models, and predicted beside observed standard deviations.
@@ -120,7 +120,7 @@ pub fn calibration_blocks(assessment: &Assessment) -> Vec<Block> {
         file: "calibration".into(),
         title: "Predicted against observed standard deviation".into(),
         caption: "Steps are put into groups of similar predicted variance; each dot is a group, with the root mean \
-                  square of the errors that came. On the line, predictions are right."
+                  square of its errors. On the line, predictions are right."
             .into(),
         thesis: String::new(),
         drawing: chart.into(),

@@ -175,7 +175,7 @@ fn initial_state_plane(trained: &Trained) -> Option<Section> {
         title: "Initial states".into(),
         caption: format!(
             "Each sequence's initial state in the plane of the first two principal components, which hold {:.0} % of their \
-             variance. What lies together starts alike.",
+             variance. Sequences whose points are close together start alike.",
             100.0 * components.share(2)
         ),
         thesis: String::new(),

@@ -8,9 +8,9 @@
 //! | module | what it holds |
 //! |---|---|
 //! | `framework` | what all studies have in common: jobs side by side, kept evaluations, measures, verdicts, the page |
-//! | `curves` | twelve Lissajous curves (3.2), and 144 patterns (6.2.3) |
-//! | `sinusoid` | a sine wave whose noise changes over time (3.3) |
-//! | `limit_cycle` | an oscillator that is driven by noise which depends on its state (3.4) |
+//! | `curves` | twelve Lissajous curves (thesis 3.2), and 144 patterns (thesis 6.2.3) |
+//! | `sinusoid` | a sine wave whose noise changes over time (thesis 3.3) |
+//! | `limit_cycle` | an oscillator that is driven by noise which depends on its state (thesis 3.4) |
 //! | `reach` | NAO learns to touch a sphere (4) |
 //! | `interact` | two robots (5) |
 //!

@@ -15,7 +15,7 @@ use crate::failure::Result;
 /// Groups of similar predicted variance.
 const BINS: usize = 20;
 
-/// One-step predictions beside what came.
+/// One-step predictions beside the samples.
 #[derive(Debug, Clone)]
 pub struct Predictions {
     /// Sample minus predicted mean, over all sequences, steps and channels.

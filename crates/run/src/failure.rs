@@ -23,7 +23,7 @@ use scrnn_data::{FileError, disk_help};
 pub enum Ending {
     /// All was done.
     Done,
-    /// Training left the finite numbers and was rolled back.
+    /// A value of the training became non-finite, and the training was rolled back.
     Diverged,
     /// Ctrl-C or another signal. Which one it was, only the program knows.
     Interrupted,

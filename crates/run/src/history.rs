@@ -25,7 +25,7 @@ pub struct Row {
     pub nll: Option<f64>,
     /// Mean squared error per step and channel, in scaled units.
     pub mse: f64,
-    /// How often the training was brought back so far.
+    /// How often the training was reset to its best network so far.
     pub recoveries: u64,
 }
 
@@ -38,7 +38,7 @@ pub fn read(path: &Path) -> Result<Vec<Row>> {
         let epoch = fields.next()?.parse().ok()?;
         let nll = fields.next()?;
         let mse = fields.next()?.parse().ok()?;
-        // Files from before trainings were brought back lack the last column.
+        // Files from before trainings were reset lack the last column.
         let recoveries = fields.nth(4).map_or(Some(0), |field| field.parse().ok())?;
         Some(Row { epoch, nll: nll.parse().ok(), mse, recoveries })
     };

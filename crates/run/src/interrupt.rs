@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub struct Interrupt(Arc<AtomicBool>);
 
 impl Interrupt {
-    /// Nobody asked yet.
+    /// Not asked for yet.
     #[must_use]
     pub fn new() -> Self {
         Self::default()

@@ -5,7 +5,7 @@
 //! | [`experiment`] | the experiment file: its types, how it is read, checked, overridden and compared |
 //! | [`source`] | the sequences of an experiment, made or read, and their fingerprint |
 //! | [`training`] | one training, from a resolved experiment to a run folder: begun, gone on with, or begun anew |
-//! | [`verdict`] | what a training came to, in words and as JSON |
+//! | [`verdict`] | the result of a training, in words and as JSON |
 //! | [`run_folder`], [`history`], [`notes`] | what a training leaves behind |
 //! | [`trained`], [`channels`] | a trained network as it is found again, and new data brought to its channels by name |
 //! | [`assessment`], [`truth`] | how well it predicts, beside simple models and what is known of the noise |

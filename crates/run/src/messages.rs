@@ -1,4 +1,4 @@
-//! How news and progress leave: whoever calls hands in where they go.
+//! How messages and progress leave: the caller hands in where they go.
 
 use std::fmt;
 

@@ -50,7 +50,7 @@ pub struct Recorder<'a> {
     /// The best network so far, if it is known, and whether its file is yet to be written.
     best: Option<(Parameters, InitialStates)>,
     best_waits: bool,
-    /// Whether the training was just brought back: that is worth a row of the history.
+    /// Whether the training was just reset to its best network: that is worth a row of the history.
     recovered: bool,
     failure: Option<Failure>,
 }
@@ -125,7 +125,7 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Ends the recording: what is not yet saved is saved, and what went wrong on the way is told.
+    /// Ends the recording: what is not yet saved is saved, and what went wrong before is reported.
     pub fn finish(&mut self, learner: &Learner, outcome: &Outcome) -> Result<()> {
         self.progress.finish();
         if let Some(failure) = self.failure.take() {

@@ -21,7 +21,7 @@ pub fn check(checkpoint: &Checkpoint, now: Notes, experiment: &Experiment, path:
     let mut changes = differences(&then.experiment, &now.experiment);
     // Samples are compared, not where they lie.
     changes.retain(|change| change.key != "data.files");
-    // A run of a version that did not bring trainings back comes to the same as long as it did not need to.
+    // A run of a version that never reset a training gives the same result as long as no reset was needed.
     changes.retain(|change| change.key != "training.on_divergence" || change.old.is_some());
     let by_lbfgs = experiment.training.lbfgs.is_some();
     let by_momentum = experiment.training.optimiser == OptimiserName::Momentum && !by_lbfgs;

@@ -57,7 +57,7 @@ pub fn load(data: &Data, threads: usize) -> Result<Source> {
             });
         }
         let Task { data, variances, .. } = make(task, size, seed, threads)?;
-        // The noise of a robot's sensors is not all that cannot be predicted: nobody knows the true variances.
+        // The noise of a robot's sensors is not all that cannot be predicted, so the true variances are unknown.
         let truth = (!task.has_robot()).then_some(Truth { task, variances });
         return Ok(Source { truth, ..Source::of(data) });
     }

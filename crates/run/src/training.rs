@@ -33,7 +33,7 @@ pub enum Found {
     Overwrite,
 }
 
-/// A training that came to an end.
+/// A training that has ended.
 #[derive(Debug)]
 pub struct Training {
     /// The run folder.

@@ -1,4 +1,4 @@
-//! What a training came to, in words and as JSON.
+//! The result of a training, in words and as JSON.
 
 use std::fmt;
 
@@ -28,7 +28,7 @@ pub struct Verdict {
     divergence: Option<Place>,
     /// Channels that never change in the samples that are predicted, where the variance is predicted.
     still_channels: Vec<String>,
-    /// How often the training was brought back to its best network, at half the rate.
+    /// How often the training was reset to its best network, at half the rate.
     recoveries: u64,
     seconds: f64,
     threads: usize,
@@ -43,7 +43,7 @@ struct ConstantModel {
     mse: f64,
 }
 
-/// Where a training left the finite numbers.
+/// Where a value of a training became non-finite.
 #[derive(Debug, Serialize)]
 struct Place {
     epoch: u64,
@@ -151,13 +151,13 @@ impl fmt::Display for Verdict {
         if self.recoveries > 0 {
             writeln!(
                 f,
-                "Training left its course {} times and was brought back each time to its best network, at half the rate: \
+                "Training became unstable {} times. Each time it went back to its best network and on at half the rate: \
                  the rate is too large for these data (history.csv has the epochs).",
                 self.recoveries
             )?;
         }
         for channel in &self.still_channels {
-            writeln!(f, "Channel {channel} never changes: its predicted variance comes down to the variance_floor.")?;
+            writeln!(f, "Channel {channel} never changes: its predicted variance falls to the variance_floor.")?;
         }
         match &self.truth {
             Some(truth) => writeln!(f, "{truth}"),
@@ -166,10 +166,10 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// What a difference in nats means.
+/// What a difference in nats means: a ratio of probability densities, averaged as logarithms.
 fn gain(nats: f64) -> String {
     if nats > 0.0 {
-        format!("the network finds a sample e^{nats:.2} = {:.1} times as likely", nats.exp())
+        format!("the probability density of a sample is e^{nats:.2} = {:.1} times as high", nats.exp())
     } else {
         "the network is not better than that yet".to_owned()
     }

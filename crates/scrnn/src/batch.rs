@@ -1,9 +1,10 @@
 //! Runs side by side, in blocks of a few columns.
 //!
 //! A block is what one thread works on: its columns share every load of a weight. Runs are ordered by length, so
-//! that at any step the columns that still run are the first ones. A single block that is more than half full and has enough work is
-//! split in two, so that a second thread has something to do: three columns twice cost a thread what six cost it at once. The split depends on the network's size and on the
-//! lengths only, never on the number of threads.
+//! that at any step the columns that still run are the first ones. A single block that is more than half full and has
+//! enough work is split in two, so that a second thread has something to do. (Two blocks of three columns cost one
+//! thread as much as one block of six.) The split depends on the network's size and on the lengths only, never on the
+//! number of threads.
 
 use std::ops::Range;
 

@@ -217,7 +217,7 @@ fn small_steps_always_lead_uphill() {
 }
 
 #[test]
-fn a_step_out_of_the_finite_numbers_is_taken_back_and_told() {
+fn a_step_to_non_finite_values_is_taken_back_and_reported() {
     let network = network(1, true, fast_and_slow());
     let ascent = Ascent::Momentum { rate: 1e307, momentum: 0.9 };
     let options = ErrorRegressionOptions { ascent, ..ErrorRegressionOptions::new(3) };

@@ -6,7 +6,7 @@ use std::num::NonZero;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread;
 
-/// What is left to do, and the cores that nobody works on.
+/// What is left to do, and the idle cores.
 #[derive(Debug)]
 struct Desk {
     next: usize,

@@ -10,13 +10,13 @@
 //! no longer gains enough, and bisected from then on. f is climbed, not descended. Learning climbs in all parameters, recognition in
 //! the initial state of each start.
 
-/// A step must gain this share of what its slope promises,
+/// A step must gain this share of what its slope promises (Armijo).
 const GAIN: f64 = 1e-4;
-/// and leave at most this share of the slope.
+/// A step must leave at most this share of the slope (curvature).
 const SLOPE: f64 = 0.9;
 /// Tries for a step.
 const TRIES: usize = 25;
-/// Length of the first try where there is no pair yet that would tell the scale.
+/// Length of the first try where there is no pair yet from which the scale is known.
 const FIRST: f64 = 1e-3;
 
 /// The last moves, and how the gradient changed along them.

@@ -57,8 +57,8 @@ pub struct RecognitionOptions {
     pub observed: Option<usize>,
     /// The largest rate; it falls on a cosine.
     pub rate: f64,
-    /// Decay of Adam's second moment. On the way from a wrong attractor to the right one the likelihood's slope falls by
-    /// orders of magnitude: who remembers the first squares for long takes steps that are too small for all the rest.
+    /// Decay of Adam's second moment. From a wrong attractor to the right one the likelihood's slope falls by orders of
+    /// magnitude. With a long memory of the first squared slopes, all later steps would be too small.
     pub beta2: f64,
     /// sigma^2_IS of the prior around the learned mean.
     pub initial_state_variance: f64,

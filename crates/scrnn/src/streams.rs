@@ -5,10 +5,10 @@
 //! ```
 //!
 //! Two generators with the same key draw the same numbers, and numbers that are drawn for two purposes from one key are not
-//! independent: noise that a network learned from would come back as its starting weights, or as what it generates. So nobody makes
-//! a generator elsewhere. The mixing can be undone, step by step, so no two triples share a key; and every bit of the key depends on
+//! independent: noise that a network learned from would come back as its starting weights, or as what it generates. So no other
+//! file makes a generator. The mixing can be undone, step by step, so no two triples share a key; and every bit of the key depends on
 //! every bit of the triple, so that neighbouring seeds and indices have nothing in common. The index says which sequence, start,
-//! epoch or trial the numbers are for: it decides, never the thread that draws.
+//! epoch or trial the numbers are for, so results do not depend on the thread that draws.
 //!
 //! The numbers of [`Purpose`] are part of what a seed means: they are never changed and never given anew.
 

@@ -31,7 +31,7 @@ pub fn make(size: (usize, usize), seed: u64, threads: usize) -> Result<Task> {
     make_while(size, seed, threads, |_| Ok(()))
 }
 
-/// The same; `begin` is told the number of each order before it is recorded, and ends everything by failing.
+/// The same; `begin` gets the number of each order before it is recorded; an error of it ends everything.
 ///
 /// # Errors
 /// As [`make`], and those of `begin`.

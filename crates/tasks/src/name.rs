@@ -114,7 +114,7 @@ impl FromStr for TaskName {
 /// which change no bit.
 ///
 /// # Errors
-/// [`Error::Setting`] for a size that the task does not have, and for [`TaskName::Reach`], whose truth nobody knows:
+/// [`Error::Setting`] for a size that the task does not have, and for [`TaskName::Reach`], whose truth is unknown:
 /// [`scrnn_sim::tutor::demonstrate`] makes its demonstrations.
 pub fn make(task: TaskName, (sequences, steps): (usize, usize), seed: u64, threads: usize) -> Result<Task> {
     Ok(match task {

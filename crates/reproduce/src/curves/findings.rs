@@ -52,7 +52,7 @@ pub struct Pattern {
     pub error_at_best_phase: f64,
     /// Of the trials of recognition, those from whose state the closed loop regenerates the pattern.
     pub recognised: Option<usize>,
-    /// Those that are within the bound while the network listens.
+    /// Those that are within the bound in the open loop.
     pub recognised_listening: Option<usize>,
 }
 
@@ -74,7 +74,7 @@ pub struct Recognised {
     pub trials: usize,
     /// From whose state the closed loop regenerates the pattern (3.2.5).
     pub succeeded: usize,
-    /// Within the same bound while the network listens.
+    /// Within the same bound in the open loop.
     pub succeeded_listening: usize,
 }
 

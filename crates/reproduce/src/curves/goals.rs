@@ -1,4 +1,4 @@
-//! What of the curves is compared with the thesis, and the goals (3.2, 6.2.3).
+//! What of the curves is compared with the thesis, and the goals (thesis 3.2, 6.2.3).
 
 use scrnn::analysis::clustering::Clustering;
 
@@ -54,8 +54,8 @@ pub fn measures(twelve: bool) -> Vec<Measure<Findings>> {
             ),
             measure(
                 "recognised_listening",
-                "Trials that predict well while they listen, of 240",
-                "the same bound one step ahead of the pattern, which a network that regenerates nothing can meet, too",
+                "Trials within the bound in the open loop, of 240",
+                "the same bound one step ahead of the pattern; a network that regenerates nothing can meet it as well",
                 "",
                 0,
                 |f| f.recognition.as_ref().map(|found| found.succeeded_listening as f64),

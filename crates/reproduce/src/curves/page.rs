@@ -245,12 +245,12 @@ fn recognition(findings: &Findings) -> Section {
     }
     let table = Sheet {
         caption: "Table 3.2: successful recognitions of 20 trials".into(),
-        head: ["pattern", "ours", "thesis", "ours, while listening"].map(String::from).to_vec(),
+        head: ["pattern", "ours", "thesis", "ours, open loop"].map(String::from).to_vec(),
         rows,
-        note: "Each trial climbs for 300 epochs from a random initial state while the network listens to five periods of the \
+        note: "Each trial climbs for 300 epochs from a random initial state, in the open loop over five periods of the \
                pattern with new noise. It succeeds if the closed loop from the state that was found stays within (3 sigma)^2 / 2 of the ideal \
-               curve for 1000 steps, by (3.5). The last column asks for that bound while the network listens, which one that regenerates \
-               nothing can meet, too."
+               curve for 1000 steps, by (3.5). The last column asks for that bound in the open loop; a network that \
+               regenerates nothing can meet it as well."
             .into(),
     };
     Section { title: "Recognition".into(), blocks: vec![Block::Sheet(table)] }

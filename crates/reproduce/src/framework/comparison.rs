@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::measure::Summary;
 use super::verdict::Verdict;
 
-/// Below this a difference of means is no accident.
+/// Below this a difference of means is significant.
 const LEVEL: f64 = 0.001;
 /// Below this a difference as large as the margin is ruled out.
 const LEVEL_OF_EQUALITY: f64 = 0.05;
@@ -80,7 +80,7 @@ impl Comparison {
 }
 
 impl Compared {
-    /// As a goal: equal, or more by no accident.
+    /// As a goal: equal, or significantly more.
     pub fn verdict(&self) -> Verdict {
         let TTest { difference, t, degrees, p, .. } = self.found;
         let found = format!("{difference:.2}, t({degrees:.1}) = {t:.2}, p = {p:.1e}");

@@ -7,7 +7,7 @@ use super::preset::Kind;
 pub struct Condition {
     /// Names its run folders and its part of metrics.json; empty where a study has one condition only.
     pub key: &'static str,
-    /// For the eye.
+    /// As it is shown.
     pub label: &'static str,
     /// The networks to train for each seed; keys that a person changes are the first one's.
     pub networks: &'static [Kind],

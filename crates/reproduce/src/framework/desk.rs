@@ -12,7 +12,7 @@ use serde::de::DeserializeOwned;
 use super::kept::Kept;
 use super::stop::{Result, Stop};
 
-/// Silence lasts no longer than this, where an evaluation tells what it is at.
+/// Silence lasts no longer than this, where an evaluation says what it is at.
 const BETWEEN_NEWS: Duration = Duration::from_secs(5);
 
 /// What an evaluation is given. It can be shared by threads.
@@ -76,7 +76,7 @@ impl<'a> Desk<'a> {
         Ok(())
     }
 
-    /// Does a part of the evaluation, unless it was done before; the name is told, and must be the part's own.
+    /// Does a part of the evaluation, unless it was done before; the name is shown, and must be the part's own.
     pub fn part<T: Serialize + DeserializeOwned>(&self, name: &str, work: impl FnOnce() -> Result<T>) -> Result<T> {
         self.at(|| name.to_owned())?;
         if let Some((value, seconds)) = self.kept.as_ref().and_then(|kept| kept.get(name)) {

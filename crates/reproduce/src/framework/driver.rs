@@ -27,7 +27,7 @@ use super::stop::{Result, Stop};
 use super::study::{Job, Learned, Study};
 use super::{overview, told};
 
-/// One job and what it came to.
+/// One job and its results.
 struct Done<S: Study> {
     result: JobResult<S::Findings>,
     networks: Vec<Learned>,
@@ -187,7 +187,7 @@ impl<S: Study> Reproduction<'_, S> {
         Ok(Done { result, networks, material })
     }
 
-    /// Everything that decides what an evaluation comes to. A checkpoint knows the digest of the data that it learned.
+    /// Everything that decides the result of an evaluation. A checkpoint knows the digest of the data that it learned.
     fn decided_by(&self, path: &Path, condition: &Condition, seed: u64, networks: &[Learned]) -> Result<String> {
         let mut decides = Decides::default();
         let edition = self.study.edition().to_string();

@@ -1,4 +1,4 @@
-//! What one job came to: its trainings and its findings.
+//! The results of one job: its trainings and its findings.
 
 use scrnn::learning::Outcome;
 use scrnn_run::training::Training;
@@ -19,14 +19,14 @@ pub struct TrainingFacts {
     pub mse: Option<f64>,
     /// Seconds of training, those of earlier processes included.
     pub seconds: f64,
-    /// How often it was brought back to its best network, at half the rate.
+    /// How often it was reset to its best network, at half the rate.
     pub recoveries: u64,
-    /// Where it left the finite numbers, if it did.
+    /// Where a value became non-finite, if one did.
     pub diverged: Option<String>,
 }
 
 impl TrainingFacts {
-    /// What is told of a training that is over.
+    /// Of a training that is over.
     pub fn of(network: &'static str, folder: &str, training: &Training) -> Self {
         Self {
             network,
@@ -72,7 +72,7 @@ pub struct JobResult<F> {
 }
 
 impl<F> JobResult<F> {
-    /// For the eye: the seed, with the condition where there are several.
+    /// As it is shown: the seed, with the condition where there are several.
     pub fn called(&self) -> String {
         match self.condition {
             None => format!("seed {}", self.seed),

@@ -1,7 +1,7 @@
 //! Parts of evaluations in a file, so that what was finished before an interruption is not done again.
 //!
-//! The file lies in the run folder of a job's first network. It names, as a digest, everything that decides what the parts
-//! come to; a file of another digest is not used. Parts are written as TOML, which has a word for numbers that are not finite.
+//! The file lies in the run folder of a job's first network. It names, as a digest, everything that decides the parts'
+//! results; a file of another digest is not used. Parts are written as TOML, which has a word for numbers that are not finite.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ use sha2::{Digest as _, Sha256};
 /// The file's name.
 pub const EVALUATION: &str = "evaluation.toml";
 
-/// Everything that decides what an evaluation comes to.
+/// Everything that decides the result of an evaluation.
 #[derive(Debug, Clone, Default)]
 pub struct Decides(Sha256);
 

@@ -107,7 +107,7 @@ impl Machine {
     }
 
     /// In a line.
-    pub fn told(&self) -> String {
+    pub fn in_words(&self) -> String {
         let processor = self.processor.as_deref().unwrap_or("unknown processor");
         let cores = if self.cores == 1 { "1 core".to_owned() } else { format!("{} cores", self.cores) };
         format!("{processor}, {cores}, {}, {}", self.instruction_set, self.system)

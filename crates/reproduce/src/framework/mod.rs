@@ -12,10 +12,10 @@
 //! | [`preset`] | the experiment files of a study's networks |
 //! | [`driver`] | from options to a page |
 //! | [`desk`], [`kept`] | what an evaluation is given; parts of evaluations in files |
-//! | [`job_result`], [`results`] | what one job came to, and all of them |
+//! | [`job_result`], [`results`] | the results of one job, and of all of them |
 //! | [`measure`], [`comparison`], [`verdict`], [`table`] | what is made of it |
 //! | [`shapes`] | what figures of several studies are made from |
-//! | [`metrics`], [`told`], [`overview`] | how it is told: as JSON, as text, as a page |
+//! | [`metrics`], [`told`], [`overview`] | how it is shown: as JSON, as text, as a page |
 //! | [`options`], [`context`], [`stop`] | what a reproduction is asked and given, and how it ends early |
 
 pub mod comparison;

@@ -1,4 +1,4 @@
-//! How an experiment is to be reproduced, and what came of it.
+//! How an experiment is to be reproduced, and the result.
 
 use std::path::PathBuf;
 
@@ -48,7 +48,7 @@ impl Options {
     }
 }
 
-/// What a reproduction came to.
+/// The result of a reproduction.
 #[derive(Debug)]
 pub struct Reproduced {
     /// How it ended.

@@ -40,7 +40,7 @@ fn lede<S: Study>(study: &S, metrics: &Metrics<'_, S::Findings>) -> String {
     format!(
         "Murata's thesis (2016), reproduced with {} on {}. Preset {}, {seeds}. Each seed has {}, and none was chosen.",
         metrics.command,
-        metrics.machine.told(),
+        metrics.machine.in_words(),
         metrics.preset,
         study.seed_draws(),
     )
@@ -154,7 +154,7 @@ fn comparisons<F>(results: &Results<F>) -> Sheet {
     }
 }
 
-/// Learning curves of every network, and what each training came to.
+/// Learning curves of every network, and the result of each training.
 fn learning<F>(results: &Results<F>, networks: &[Vec<Learned>]) -> Section {
     let mut blocks = Vec::new();
     for condition in &results.conditions {
@@ -208,7 +208,7 @@ fn circumstances<F>(metrics: &Metrics<'_, F>) -> Section {
     let rows = vec![
         vec!["command".to_owned(), metrics.command.clone()],
         vec!["version".into(), format!("scrnn {}", metrics.version)],
-        vec!["machine".into(), metrics.machine.told()],
+        vec!["machine".into(), metrics.machine.in_words()],
         vec!["time of this call".into(), time],
     ];
     let sheet = Sheet { caption: "Circumstances".into(), head: Vec::new(), rows, note: String::new() };

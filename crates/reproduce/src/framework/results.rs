@@ -1,4 +1,4 @@
-//! What all jobs of a study came to, and what is made of it.
+//! The results of all jobs of a study, and what is made of them.
 
 use scrnn_run::experiment::Experiment;
 

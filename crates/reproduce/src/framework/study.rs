@@ -37,7 +37,7 @@ pub trait Study: Sync {
         "data and initial weights of its own"
     }
 
-    /// Grows whenever an evaluation comes to other numbers for the same networks: what was kept before is then not used.
+    /// Grows whenever an evaluation gives other numbers for the same networks: what was kept before is then not used.
     fn edition(&self) -> u32 {
         1
     }

@@ -1,4 +1,4 @@
-//! Whether goals are reached. Goals are of science; how long something takes is told beside them, and never judged.
+//! Whether goals are reached. Goals are of science; how long something takes is reported beside them, and never judged.
 
 use serde::Serialize;
 

@@ -154,7 +154,7 @@ pub fn initial_states(materials: &[&Material]) -> Figure {
     figure(
         "initial-states",
         "Initial states of the slow units",
-        "Each dot is the learned initial state of one order, in the plane of its condition's first two principal components. Mind the \
+        "Each dot is the learned initial state of one order, in the plane of its condition's first two principal components. Note the \
          axes: the narrow states lie thousands of times closer together."
             .into(),
         "Fig. 5.3: in one point for the narrow condition, spread out for the wide one.",

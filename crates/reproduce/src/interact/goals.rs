@@ -1,4 +1,4 @@
-//! What of the interaction is compared with the thesis, between conditions, and the goals (5.3).
+//! What of the interaction is compared with the thesis, between conditions, and the goals (thesis 5.3).
 
 use super::findings::Findings;
 use super::world::InWorld;

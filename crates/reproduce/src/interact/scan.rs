@@ -12,7 +12,7 @@ const EVERY: usize = 4;
 /// One setting.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setting {
-    /// For the eye.
+    /// As it is shown.
     pub name: String,
     /// The options.
     pub options: ErrorRegressionOptions,

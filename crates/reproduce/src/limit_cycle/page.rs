@@ -1,4 +1,4 @@
-//! Figures and tables of the oscillator (3.4).
+//! Figures and tables of the oscillator (thesis 3.4).
 
 use scrnn::analysis::oscillation::Oscillation;
 use scrnn_pages::calibration_blocks;
@@ -125,7 +125,7 @@ fn swings(jobs: &[JobResult<Findings>]) -> Block {
         rows: jobs.iter().flat_map(rows).collect(),
         note: "A cycle lasts from one upward crossing of 0 to the next; its amplitude is half the distance between its highest and \
                lowest value. Network and oscillator run for 50000 steps from each sequence's start; the learned sequences are too short \
-               to tell 5 % apart."
+               to determine a spread within 5 %."
             .into(),
     })
 }

@@ -305,7 +305,7 @@ fn shifts(findings: &Findings) -> Block {
         caption: "The sphere is put elsewhere while the robot moves".into(),
         head: ["from, mm", "to, mm", "at sample", "samples to the first touch", "touched after that"].map(String::from).to_vec(),
         rows: findings.shifts.iter().map(row).collect(),
-        note: "The first cycle at the new place may come too late, since the arm was already on its way; it is left out of the \
+        note: "The first cycle at the new place may come too late, since the arm was already moving to the old one; it is left out of the \
                last column."
             .into(),
     })
@@ -343,7 +343,7 @@ fn drivers(job: &JobResult<Findings>, several: bool) -> Block {
 fn meaning() -> Block {
     Block::Text(format!(
         "Replay plays the mean of the ten demonstrations at the nearest position and does not look at the sphere. GMM/GMR is \
-         Gaussian mixture regression with {} components, as many numbers as the network has: it is told the metronome's phase, \
+         Gaussian mixture regression with {} components, as many numbers as the network has: it gets the metronome's phase, \
          which the network must keep by itself, and where the head looks.",
         super::trials::COMPONENTS
     ))

@@ -1,4 +1,4 @@
-//! Performances of the reaching experiment: who drives the arm, where the sphere lies, what came of it.
+//! Performances of the reaching experiment: who drives the arm, where the sphere lies, and the result.
 
 use scrnn::analysis::mixture::{GaussianMixture, MixtureOptions};
 use scrnn::engine::Engine;
@@ -52,7 +52,7 @@ pub struct Trial {
     pub pictures: bool,
 }
 
-/// What one performance came to.
+/// The result of one performance.
 #[derive(Debug, Clone)]
 pub struct Given {
     /// All of it.

@@ -33,8 +33,8 @@ fn variance(by_phase: &ByPhase) -> Block {
     figure(
         "variance-by-phase",
         "Predicted variance over the cycle",
-        "Mean over the arm's four channels, in the network's units. What is predicted is the error of the next step, which is less \
-         than how much the demonstrations differ from each other: much of that is known half a second before.",
+        "Mean over the arm's four channels, in the network's units. The network predicts the variance of its next error. \
+         That is less than the variance between demonstrations, because much of it is known half a second before.",
         "4.3.1: the variance decreases to the minimum at the very moment of touching the object and increases after the robot \
          retracts its arm.",
         chart,

@@ -190,7 +190,7 @@ impl Study for Sinusoid {
             file: "time".into(),
             title: "Data, output and variance".into(),
             caption: "Six periods of the data, of the closed loop with noise of the predicted variance, and of that variance \
-                      beside the true one, for each seed. Nobody told the network how the noise grows and falls."
+                      beside the true one, for each seed. The network has no input that says how the noise grows and falls."
                 .into(),
             thesis: "Fig. 3.6: the output has the noise of the data, and the predicted variance is close to the true one.".into(),
             drawing: chart.into(),

@@ -1,4 +1,4 @@
-//! The experiment file: everything that decides what a training comes to.
+//! The experiment file: everything that decides the result of a training.
 //!
 //! The types here are the file's format. [`read()`] turns a file and `--set` options into an [`Experiment`], checked, with
 //! every default filled in; the run folder keeps it in that form.
@@ -208,7 +208,7 @@ pub struct Training {
     /// learned stays the same to the bit.
     #[serde(default)]
     pub recompute: bool,
-    /// What to do when training leaves its course.
+    /// What to do when training becomes unstable: a value is not finite, or the likelihood collapses.
     #[serde(default = "recover")]
     pub on_divergence: OnDivergence,
     /// Options of "momentum".

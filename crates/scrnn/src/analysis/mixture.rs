@@ -285,7 +285,7 @@ fn nearest_centres(points: &[DVector<f64>], options: &MixtureOptions) -> DMatrix
     DMatrix::from_fn(points.len(), options.components, |row, k| f64::from(u8::from(nearest[row].1 == k)))
 }
 
-/// The factor of a covariance. The floor keeps it positive; should rounding still spoil it, its diagonal serves.
+/// The factor of a covariance. The floor keeps it positive definite. If rounding still spoils that, the factor is that of its diagonal.
 fn factor(covariance: &DMatrix<f64>) -> Cholesky<f64, Dyn> {
     covariance.clone().cholesky().unwrap_or_else(|| {
         let diagonal = covariance.diagonal().map(|value| value.max(f64::MIN_POSITIVE));

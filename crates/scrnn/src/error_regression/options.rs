@@ -127,6 +127,6 @@ pub struct Regression {
     pub ln_likelihood: [f64; 2],
     /// Sums of squared errors in the window, before and after.
     pub squared_error: [f64; 2],
-    /// Whether a step left the finite numbers: it was taken back, and no more were made.
+    /// Whether a step led to non-finite values: it was taken back, and no more were made.
     pub diverged: bool,
 }

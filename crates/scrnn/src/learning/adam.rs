@@ -73,7 +73,7 @@ pub(super) struct Batch<'a> {
 #[derive(Debug, Clone)]
 pub(super) struct AdamRule {
     options: Adam,
-    /// The guard's factor; 1 unless the training left its course.
+    /// The guard's factor; 1 unless the training became unstable.
     pub guarded: f64,
     shared: Moments,
     initial: Moments,

@@ -3,9 +3,9 @@
 //! Sequences are dealt once, at random and always alike; every epoch takes the batches in a new order, which depends on
 //! the epoch's number alone. So a training that goes on from a checkpoint needs to know no more than its epoch.
 //!
-//! With one batch an epoch is: evaluate everything, report, update. With several, each is evaluated at the parameters that
-//! its predecessors left, and what an epoch reports is the sum of that: values of parameters on their way. Only before the
-//! first update and after the last are all sequences evaluated at the same parameters.
+//! With one batch an epoch is: evaluate everything, report, update. With several, each batch is evaluated with the
+//! parameters after the batch before it, and an epoch reports the sum: each term belongs to other parameters. Only before
+//! the first update and after the last are all sequences evaluated with the same parameters.
 
 use std::ops::Range;
 
@@ -25,13 +25,13 @@ use crate::topology::Topology;
 #[derive(Debug)]
 pub(super) struct Batches {
     objective: Box<dyn Objective>,
-    /// What the last batch came to.
+    /// The evaluation of the last batch.
     evaluation: Evaluation,
     /// One run through each sequence, in their order.
     runs: Vec<Run>,
-    /// The same in the order in which they are dealt: each batch is a part of it,
+    /// The same in the order in which they are dealt; each batch is a part of this list.
     dealt: Vec<Run>,
-    /// from one end to the next.
+    /// Where each batch ends in `dealt`.
     ends: Vec<usize>,
     /// In which order this epoch takes the batches.
     order: Vec<usize>,

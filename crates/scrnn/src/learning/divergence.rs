@@ -1,4 +1,4 @@
-//! Where a training left the finite numbers.
+//! Where a value of a training became non-finite.
 
 use std::fmt;
 

@@ -133,7 +133,7 @@ fn a_channel_that_never_changes_comes_down_to_the_floor() {
 
 /// Without a floor the likelihood grows for ever. Whatever comes, the network that is left holds numbers.
 #[test]
-fn a_channel_that_never_changes_never_leaves_a_network_without_numbers() {
+fn a_channel_that_never_changes_never_makes_a_network_non_finite() {
     for optimiser in [
         Optimiser::Adam(Adam { rate: 0.1, final_rate: 0.1, ..Adam::default() }),
         Optimiser::Momentum(Momentum { rate: 0.1, ..Momentum::default() }),
@@ -217,7 +217,7 @@ fn thousands_of_channels_train() {
 }
 
 #[test]
-fn any_rate_ends_in_a_network_of_numbers() {
+fn any_rate_ends_in_a_network_of_finite_values() {
     for rate in [1e-300, 1e-12, 1.0, 1e3, 1e12, 1e150, 1e300] {
         for optimiser in [
             Optimiser::Momentum(Momentum { rate, ..Momentum::default() }),

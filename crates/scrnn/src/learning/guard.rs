@@ -1,7 +1,7 @@
-//! Brings a training that left its course back to its best network, at half the rate.
+//! Resets a training that became unstable to its best network, and halves its rate.
 //!
-//! A rate that is too large shows in two ways: values leave the finite numbers, or the likelihood collapses while all values
-//! stay finite, and the network spends thousands of epochs, or all the rest, on coming back. Both count.
+//! A rate that is too large shows in two ways: values become non-finite, or the likelihood collapses while all values stay
+//! finite, and the network needs thousands of epochs, or all the rest, to recover. Both count.
 //!
 //! The epochs go on counting, so that a training ends when its plan says; the optimiser's memory goes back with the network. All
 //! that the guard knows is part of the optimiser's state in a checkpoint.
@@ -21,7 +21,7 @@ pub(super) const LARGEST_RISE: f64 = 10.0;
 /// Each recovery goes on at this share of the rate.
 const SLOWER: f64 = 0.5;
 
-/// How a training was brought back.
+/// How a training was reset to its best network.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recovery {
     /// What went wrong; `rolled_back_to` is the epoch of the best network, where the training goes on from.

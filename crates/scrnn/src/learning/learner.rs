@@ -37,7 +37,7 @@ pub struct EpochReport {
     pub rate_initial: f64,
     /// Length of the gradient of ln L_out per step and channel in the shared parameters; in batches, of the last one.
     pub gradient_norm: f64,
-    /// How often the training was brought back so far.
+    /// How often the training was reset to its best network so far.
     pub recoveries: u64,
     /// Whether all tries of the adaptive rate (D.1) failed: the update was withdrawn, and the network is that of the epoch before. The
     /// next one tries at the rate that is left. (`false` in the first report after a training was taken up again.)
@@ -47,10 +47,10 @@ pub struct EpochReport {
 /// Watches a training, and can stop it.
 pub trait Observer {
     /// Called before each epoch, and after the last: a run of N epochs makes N + 1 calls. `learner` holds what was evaluated (in
-    /// batches, what came out of it): saved here and restored later, a training goes on bit for bit.
+    /// batches, the parameters after it): saved here and restored later, a training goes on bit for bit.
     fn epoch(&mut self, report: &EpochReport, learner: &Learner) -> ControlFlow<()>;
 
-    /// Called when a training that left its course was brought back, before it goes on.
+    /// Called when a training became unstable and was reset to its best network, before it goes on.
     fn recovered(&mut self, _recovery: &Recovery) {}
 }
 
@@ -60,7 +60,7 @@ impl<F: FnMut(&EpochReport, &Learner) -> ControlFlow<()>> Observer for F {
     }
 }
 
-/// How a training ended. Divergence is an outcome and no error: whoever ignores it goes on with a network that never learned.
+/// How a training ended. Divergence is an outcome and no error. A caller that ignores it may use a network that never learned.
 #[must_use = "a training may have diverged or been stopped"]
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
@@ -68,8 +68,7 @@ pub enum Outcome {
     Finished,
     /// The observer stopped it.
     Stopped,
-    /// A value was not finite, or the training could not be brought back often enough; the learner is back at the last good
-    /// state.
+    /// A value was not finite, or the training became unstable too often. The learner is back at the last good state.
     Diverged(Divergence),
 }
 
@@ -130,7 +129,7 @@ pub struct Learner {
     data: Dataset,
     terms: f64,
     batches: Batches,
-    /// The rule of the last epochs. It never needs to be brought back, so it is no part of the state.
+    /// The rule of the last epochs. It never needs a reset, so it is no part of the state.
     lbfgs: Option<LbfgsRule>,
     /// Whether `batches` already holds what the next report says.
     evaluated: bool,
@@ -268,7 +267,7 @@ impl Learner {
         self.state.epoch
     }
 
-    /// How often the training was brought back.
+    /// How often the training was reset to its best network.
     #[must_use]
     pub fn recoveries(&self) -> u64 {
         self.guard.as_ref().map_or(0, |guard| guard.recoveries)

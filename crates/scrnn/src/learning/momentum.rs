@@ -30,7 +30,7 @@ pub(super) struct MomentumRule {
     mean: Vec<f64>,
     /// The factor of the adaptive rate; 1 otherwise.
     pub factor: f64,
-    /// The guard's factor; 1 unless the training left its course.
+    /// The guard's factor; 1 unless the training became unstable.
     pub guarded: f64,
     /// d ln L_all / d u_0 and of the mean, where the prior acts as printed.
     gradient: Option<InitialStates>,

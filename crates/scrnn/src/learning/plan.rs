@@ -18,17 +18,17 @@ pub struct Plan {
     /// Keep only a part of the states and compute the rest again on the way back: memory grows with the square root of
     /// the sequences' length, time by a third, and the bits stay the same.
     pub recompute: bool,
-    /// What to do when the training leaves its course.
+    /// What to do when the training becomes unstable.
     pub on_divergence: OnDivergence,
 }
 
-/// What to do when a training leaves its course.
+/// What to do when a training becomes unstable: a value is not finite, or the likelihood collapses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum OnDivergence {
-    /// Go back to the last finite epoch and stop. A likelihood that collapses while all values stay finite is let pass.
+    /// Go back to the last finite epoch and stop. A likelihood that collapses while all values stay finite is accepted.
     Stop,
     /// Go back to the best network, halve the rate, and go on; also when the likelihood collapses. After twenty times stop.
     Recover,
@@ -58,7 +58,7 @@ pub enum Optimiser {
 }
 
 /// Gradient ascent with momentum. With T_total steps in all and N_O channels, shared parameters ascend at
-/// alpha / (T_total N_O) and initial states at alpha / N_O (2.7).
+/// alpha / (T_total N_O) and initial states at alpha / N_O (thesis 2.7).
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]

@@ -385,7 +385,7 @@ impl Observer for Watch {
 }
 
 #[test]
-fn a_training_that_leaves_its_course_is_brought_back_and_ends_well() {
+fn a_training_that_becomes_unstable_is_reset_and_ends_well() {
     for optimiser in [
         Optimiser::Momentum(Momentum { rate: 0.3, ..Momentum::default() }),
         Optimiser::Momentum(Momentum { rate: 1e4, adaptive_rate: None, ..Momentum::default() }),

@@ -30,7 +30,7 @@ impl Backend for Engine {
     }
 }
 
-/// A block and what came out of it.
+/// A block and its results.
 #[derive(Debug)]
 struct Job {
     block: Block,

@@ -21,7 +21,7 @@ pub struct Polish {
     pub updates: u64,
     /// What they gained, in nats per step and channel.
     pub gain: f64,
-    /// Whether it came to an end: the last ten updates together gained at most the tolerance, or no step gained anything any more.
+    /// Whether it converged: the last ten updates together gained at most the tolerance, or no step gained anything any more.
     /// If not, it ran out of updates, or the start never had a likelihood.
     pub converged: bool,
 }

@@ -103,8 +103,8 @@ pub struct Followed {
 /// Lets the network follow an order to its end. `observe` hands each sample to the regression, and may keep a deadline;
 /// `watch` sees the world at each sample, before time passes, and ends the interaction by an error of its own.
 ///
-/// While the object is out of view, its channels hold what was sensed of it last, see [`Interaction::sense`]; the network is
-/// not told so, and goes on. [`ControlStep::object_in_view`] tells it to whoever looks on.
+/// While the object is out of view, its channels hold what was sensed of it last, see [`Interaction::sense`]. The network
+/// gets no sign of that, and goes on; [`ControlStep::object_in_view`] shows it to the caller.
 ///
 /// # Errors
 /// [`Error::Length`] for a network of other channels, [`Error::Network`] for options out of their range, and what `observe`

@@ -3,8 +3,8 @@
 //!
 //! Sides are the self-robot's: left is its +y. The other robot follows an order of primitives, each of them out, hold, back
 //! and rest, by minimum-jerk movements between three postures. The self-robot's head fixates the object with a lag, so that
-//! the object's place in the image says how it moves; its arm is led by a tutor or by whoever calls [`Interaction::step`].
-//! A sample is taken every 100 ms, before the arm is told where to be at the next one.
+//! the object's place in the image says how it moves; its arm is led by a tutor or by the caller of [`Interaction::step`].
+//! A sample is taken every 100 ms, before the arm gets its target for the next one.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand::rngs::ChaCha8Rng;

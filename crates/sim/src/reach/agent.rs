@@ -206,7 +206,7 @@ impl Driver for MixtureDriver {
         if let Some(random) = &mut self.random {
             let covariance = nalgebra::Matrix4::from_row_slice(&regressed.covariance);
             let z = nalgebra::Vector4::from_fn(|_, _| StandardNormal.sample(random));
-            // Where rounding has spoilt the covariance, its diagonal serves.
+            // Where rounding has left the covariance without a factor, noise is drawn by its diagonal.
             let noise = covariance.cholesky().map_or_else(
                 || z.component_mul(&covariance.diagonal().map(|v| v.max(0.0).sqrt())),
                 |factor| factor.l() * z,
@@ -234,7 +234,7 @@ pub struct Performance {
     pub world: WorldOptions,
 }
 
-/// What a performance came to, sample by sample.
+/// The result of a performance, sample by sample.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Performed {
     /// What the robot sensed: samples x channels, row-major, in rad.

@@ -1,4 +1,4 @@
-//! What counts as a touch, and what a movement of touches and retractions came to.
+//! What counts as a touch, and the result of a movement of touches and retractions.
 //!
 //! A cycle begins when the hand comes within 60 mm of the sphere and ends when it is more than 90 mm away. It was a touch
 //! if, at one moment, hand and sphere were no more than 5 mm apart and the hand was within 15 mm of where it was taught to

@@ -75,7 +75,7 @@ pub struct Demonstration {
     pub y: f64,
     /// What the robot sensed: samples x channels, row-major, in rad.
     pub samples: Vec<f64>,
-    /// What the movement came to.
+    /// The result of the movement.
     pub cycles: Vec<Cycle>,
 }
 

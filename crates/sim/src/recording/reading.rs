@@ -1,4 +1,4 @@
-//! Reads a recording back, for tests: the joints and the frames that it told last.
+//! Reads a recording back, for tests: the last joints and frames in it.
 
 use std::collections::BTreeMap;
 

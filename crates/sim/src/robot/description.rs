@@ -130,7 +130,7 @@ impl Robot {
     }
 
     /// Name and angle of every joint that the description calls movable: those of q, and those that are
-    /// [locked](Robot::lock). Whoever has only the description places all links with them.
+    /// [locked](Robot::lock). Without a world, these place all links.
     #[must_use]
     pub fn all_angles(&self, q: &[f64]) -> Vec<(&str, f64)> {
         let angle = |joint: &Joint| match joint.motion {

@@ -204,8 +204,8 @@ impl World {
         self.add(name, part, shape, RigidBodyBuilder::fixed().pose(to_pose(&world_from_shape)))
     }
 
-    /// Puts a kinematic thing into the world: it goes where it is [told](World::move_kinematic), and pushes away what is in
-    /// its way.
+    /// Puts a kinematic thing into the world: it goes where [`World::move_kinematic`] puts it, and pushes away what
+    /// it meets.
     ///
     /// # Errors
     /// [`Error::Taken`].
