@@ -196,7 +196,7 @@ fn requests_that_do_not_go_together_are_refused() {
         ("recognize run new.csv --online --deadline 0", "--deadline is 0"),
         ("recognize run new.csv --online --sequence 7", "there is no learned sequence 7"),
         ("recognize run new.csv --online --closed-channels z", "no channel `z`"),
-        ("recognize run new.csv --online --window 0", "the window is 0"),
+        ("recognize run new.csv --online --window 0", "from 1 to 1000000"),
         ("recognize run - --online --out f.csv", "do not go with a stream"),
         ("simulate interact run --order RLLLR", "the network's channels are y"),
         ("data sinusoid --out world.mcap", "sinusoid has none"),
