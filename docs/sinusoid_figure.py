@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Draws docs/sinusoid.svg: what a network that learned the thesis' sine wave predicts.
 
-    scrnn train assets/experiments/sinusoid.toml
+    scrnn train assets/experiments/sinusoid_fast.toml
     scrnn data sinusoid --out wave.csv
-    scrnn generate runs/sinusoid --mode open --out open.csv
-    scrnn generate runs/sinusoid --out closed.csv
+    scrnn generate runs/sinusoid_fast --sequence 1 --mode open --data wave.csv --out open.csv
+    scrnn generate runs/sinusoid_fast --sequence 1 --out closed.csv
     python3 docs/sinusoid_figure.py wave.csv wave.truth.csv open.csv closed.csv > docs/sinusoid.svg
 
 Row 1 of the generated files predicts sample 2: the network's delay is 1. Needs no package.
