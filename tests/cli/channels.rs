@@ -42,9 +42,14 @@ fn files_that_are_learned_together_may_have_their_columns_in_any_order() {
     place.ok("train sine.toml --out same --set data.files=[\"arm.csv\",\"same.csv\"]");
     let nll = |run: &str| place.json(&format!("inspect {run} --json"))["score"]["nll"].as_f64().unwrap();
     assert_eq!(nll("run").to_bits(), nll("same").to_bits());
-    // Without a header nobody knows which column is which.
-    let rows = table(["shoulder", "elbow"], [1, 0]).split_once('\n').unwrap().1.to_owned();
-    place.write("swapped.csv", rows);
-    let (_, told) = place.fails(2, "train sine.toml --out other");
-    assert!(told.contains("need the same channels, by name"), "{told}");
+    // A file without a header is taken by position, and that is said.
+    let rows = table(["shoulder", "elbow"], [0, 1]).split_once('\n').unwrap().1.to_owned();
+    place.write("nameless.csv", rows);
+    let output = place.run("train sine.toml --out other --set data.files=[\"arm.csv\",\"nameless.csv\"]");
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && told.contains("warning") && told.contains("nameless.csv"), "{told}");
+    // Other names are refused.
+    place.write("others.csv", table(["knee", "hip"], [0, 1]));
+    let (_, told) = place.fails(2, "train sine.toml --out third --set data.files=[\"arm.csv\",\"others.csv\"]");
+    assert!(told.contains("need the same channels, by the same names"), "{told}");
 }
