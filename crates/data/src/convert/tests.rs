@@ -1,3 +1,5 @@
+//! Conversions: what is written reads as what went in.
+
 use std::path::Path;
 
 use scrnn::dataset::Sequence;

@@ -1,3 +1,5 @@
+//! HDF5 files of other software and of this one, whole and damaged.
+
 use std::path::{Path, PathBuf};
 
 use super::*;

@@ -1,3 +1,5 @@
+//! LeRobot data sets: episodes, names, several files, damage.
+
 use std::path::{Path, PathBuf};
 
 use crate::{FileError, Reading, Selection, inspect};

@@ -1,3 +1,5 @@
+//! Parquet files of other software, whole and damaged.
+
 use std::path::{Path, PathBuf};
 
 use super::*;
