@@ -1,7 +1,7 @@
 //! Trains as an experiment file says, into a folder, without a terminal.
 //!
 //! ```console
-//! cargo run --release -p scrnn-run --example train -- assets/experiments/sinusoid_fast.toml /tmp/run
+//! cargo run --release -p scrnn-run --example train_in_folder -- assets/experiments/sinusoid_fast.toml /tmp/run
 //! ```
 
 use std::path::PathBuf;
