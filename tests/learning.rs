@@ -143,7 +143,8 @@ fn finds_the_noise(name: &str, least_correlation: f64) {
 
 #[test]
 fn the_thesis_sine_wave_is_learned_with_its_noise() {
-    finds_the_noise("sinusoid", 0.98);
+    // One sequence shows its noise to 0.97 to 0.99, whatever the seed: see docs/reproduction.md.
+    finds_the_noise("sinusoid", 0.96);
 }
 
 #[test]

@@ -24,7 +24,7 @@ fn an_unknown_key_is_shown_with_near_names() {
 fn a_value_out_of_range_is_shown_with_what_is_needed() {
     for (from, to, needed) in [
         ("time_constant = 2.0", "time_constant = 0.5", "at least 1"),
-        ("units = 6", "units = 0", "at least 1 unit"),
+        ("units = 6", "units = 0", "1 to 1e6 units"),
         ("rate = 1e-3", "rate = -1e-3", "a number above 0"),
         ("checkpoint_every = 10", "checkpoint_every = 0", "at least 1 epoch"),
         ("name = \"sine\"", "name = \"a/b\"", "a folder can have"),

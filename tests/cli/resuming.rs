@@ -85,7 +85,7 @@ fn ctrl_c_saves_and_says_how_to_go_on() {
 fn a_longer_momentum_run_goes_on_from_a_shorter_one() {
     // The last rate is too large: there the best epoch lies in the first part.
     for (extra, rate, best) in
-        [("", "1e-3", 150), ("[training.momentum.adaptive_rate]\n", "1e-3", 150), ("", "0.02", 61)]
+        [("", "1e-3", 150), ("[training.momentum.adaptive_rate]\n", "1e-3", 150), ("", "0.025", 45)]
     {
         let experiment = SINE.replace("[output]", &format!("{extra}[output]\nhistory_every = 7"));
         let experiment = experiment.replace("[training]", "[training]\non_divergence = \"stop\"");
@@ -160,7 +160,7 @@ fn lbfgs_makes_the_last_epochs_and_their_number_is_part_of_the_experiment() {
     let (rate, nll) = (column("rate_shared"), column("nll"));
     assert_eq!((rate.len(), rate[40]), (121, 1.0));
     assert!(rate[..40].iter().all(|&rate| rate <= 1e-3), "{rate:?}");
-    assert!(rate[41..].iter().filter(|&&step| step == 1.0).count() > 60, "{rate:?}");
+    assert!(rate[41..].iter().filter(|&&step| step == 1.0).count() > 40, "{rate:?}");
     assert_eq!(found["nll"].as_f64(), Some(nll[120]));
     assert!(nll[120] < nll[40] - 0.5, "{} to {}", nll[40], nll[120]);
     assert!(place.ok("inspect run").contains("adam, then L-BFGS"));

@@ -106,7 +106,10 @@ fn states(arguments: &Arguments, checkpoint: &Checkpoint) -> Result<Vec<State>> 
 
 /// The initial states in a file: every row of every sequence in it is one.
 fn given(path: &Path, checkpoint: &Checkpoint) -> Result<Vec<State>> {
-    let file = files::read(path)?;
+    // A single state is an array of one row: its axes are no matter of doubt.
+    let is_array = path.extension().is_some_and(|extension| extension == "npy" || extension == "npz");
+    let axes = is_array.then_some(files::Axes { sequences: None, steps: 0, channels: Some(1) });
+    let file = files::read_part(path, &files::Selection { axes, ..files::Selection::default() })?;
     let (found, needed) = (file.channels().len(), checkpoint.topology.context_units());
     if found != needed {
         let message = format!("{} has {found} columns, but the network has {needed} context units", path.display());
