@@ -3,12 +3,14 @@
 
     read_formats.py FOLDER
 
-Step t of channel c in episode e is 16 e + t / 4 + c / 32. Where the package lerobot is installed, it loads the data set.
+Step t of channel c in episode e is 16 e + t / 4 + c / 32. Where the packages
+datasets and lerobot are installed, they load the data set.
 Exit code 0: all is as it should be. 1: it is not.
 """
 
 import json
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -57,6 +59,27 @@ def lerobot(folder):
     assert stats["count"] == [sum(LENGTHS)]
 
 
+def with_datasets(folder):
+    """Loads the frames as LeRobot does: through Hugging Face's datasets, held to the features of info.json."""
+    try:
+        import datasets
+    except ImportError:
+        return "not installed"
+    features = {}
+    for name, feature in json.loads((folder / "meta/info.json").read_text())["features"].items():
+        value = datasets.Value(dtype=feature["dtype"])
+        many = feature["shape"] != [1]
+        features[name] = datasets.Sequence(length=feature["shape"][0], feature=value) if many else value
+    paths = [str(path) for path in sorted((folder / "data").glob("*/*.parquet"))]
+    with tempfile.TemporaryDirectory() as cache:
+        data = datasets.Dataset.from_parquet(paths, features=datasets.Features(features), cache_dir=cache)
+        assert len(data) == sum(LENGTHS)
+        assert data[31]["observation.state"] == state(1, 20)[1].tolist() and data[31]["action"] == -state(1, 20)[1, 0]
+        paths = [str(path) for path in sorted((folder / "meta/episodes").glob("*/*.parquet"))]
+        assert datasets.Dataset.from_parquet(paths, cache_dir=cache)[2]["length"] == LENGTHS[2]
+    return "loads it"
+
+
 def with_lerobot(folder):
     try:
         from lerobot.datasets.lerobot_dataset import LeRobotDataset
@@ -98,6 +121,7 @@ def main():
     assert np.array_equal(frame["observation.state.elbow"][30:50], state(1, 20)[:, 1])
     frames = pd.read_parquet(folder / "frames.parquet")
     assert len(frames) == sum(LENGTHS)
+    print("datasets:", with_datasets(folder / "lerobot"))
     print("lerobot:", with_lerobot(folder / "lerobot"))
 
 

@@ -229,4 +229,11 @@ Frame Time: 0.0333333
         let fewer = read(&ARM.replace("Frames: 3", "Frames: 9")).unwrap();
         assert!(fewer.remarks[0].to_string().contains("9 frames are promised, 3 are there"));
     }
+
+    #[test]
+    fn damaged_bytes_never_panic() {
+        crate::tests_random::damage(ARM.as_bytes(), 2000, 16 << 20, |bytes| {
+            let _ = inspect_bytes(Path::new("x.bvh"), bytes, &Selection::default());
+        });
+    }
 }

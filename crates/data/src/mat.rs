@@ -339,21 +339,12 @@ mod tests {
 
     #[test]
     fn damaged_bytes_never_panic() {
-        let runs = std::env::var("SCRNN_FLIPS").ok().and_then(|runs| runs.parse().ok()).unwrap_or(500);
         for name in ["packed.mat", "plain.mat", "cells.mat", "structure.mat"] {
             let bytes = fixture(name);
-            let mut random = crate::tests_random::Random(7);
-            for _ in 0..runs {
-                let mut damaged = bytes.clone();
-                for _ in 0..=random.below(3) {
-                    let place = random.below(damaged.len());
-                    damaged[place] = random.below(256) as u8;
-                }
-                let _ = inspect_bytes(Path::new("x.mat"), &damaged, &Selection::default());
-            }
-            for length in 0..bytes.len() {
-                let _ = inspect_bytes(Path::new("x.mat"), &bytes[..length], &Selection::default());
-            }
+            crate::tests_random::damage(&bytes, 500, 16 << 20, |bytes| {
+                let _ = Contents::read(bytes, &Budget::of(16 << 20));
+                let _ = inspect_bytes(Path::new("x.mat"), bytes, &Selection::default());
+            });
         }
     }
 }

@@ -205,4 +205,16 @@ mod tests {
         assert!(matches!(read("@data\n"), Err(FileError::Empty { .. })));
         assert!(matches!(read("@classLabel true a\n@data\n1,?,3:a\n"), Err(FileError::NotFinite { .. }) | Ok(_)));
     }
+
+    #[test]
+    fn damaged_bytes_never_panic() {
+        crate::tests_random::damage(
+            format!("{HEAD}1,2,3:-1,-2,?:a\n4,5:0.5,1e-1:b\n").as_bytes(),
+            2000,
+            16 << 20,
+            |bytes| {
+                let _ = inspect_bytes(Path::new("x.ts"), bytes, &Selection::default());
+            },
+        );
+    }
 }

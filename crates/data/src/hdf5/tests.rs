@@ -4,7 +4,10 @@ use std::path::{Path, PathBuf};
 
 use super::*;
 use crate::budget::Budget;
+use crate::tests_random::damage;
 use crate::{Axes, Reading, inspect_bytes};
+
+const BUDGET: u64 = 16 << 20;
 
 /// What tests/python/write_formats.py wrote with h5py. `SCRNN_FIXTURES` can name a folder with all that it writes.
 fn fixture(name: &str) -> Vec<u8> {
@@ -191,7 +194,7 @@ fn a_matlab_file_has_its_axes_in_reverse() {
 
 /// Reads all that is there.
 fn read_all(bytes: &[u8]) -> Option<usize> {
-    let budget = Budget::of(16 << 20);
+    let budget = Budget::of(BUDGET);
     let file = File::open(bytes, &budget).ok()?;
     let contents = Contents::read(&file).ok()?;
     let _ = layout::samples(&file, &contents, &Selection::default());
@@ -200,26 +203,34 @@ fn read_all(bytes: &[u8]) -> Option<usize> {
 
 #[test]
 fn damaged_bytes_never_panic() {
-    let runs = std::env::var("SCRNN_FLIPS").ok().and_then(|runs| runs.parse().ok()).unwrap_or(300);
-    let all = ["robomimic_grown_both.hdf5", "robomimic_gzip.hdf5", "many_new.h5"];
-    let names = ["small.hdf5", "small_new.hdf5", "types.h5", "flags.h5", "indexes.h5"];
-    let all = if std::env::var_os("SCRNN_FIXTURES").is_some() { &all[..] } else { &[] };
-    for name in names.iter().chain(all) {
+    for name in ["small.hdf5", "small_new.hdf5", "types.h5", "flags.h5", "indexes.h5"] {
         let bytes = fixture(name);
         assert!(read_all(&bytes).is_some_and(|count| count > 0), "{name}");
-        let mut random = crate::tests_random::Random(7);
-        for _ in 0..runs {
-            let mut damaged = bytes.clone();
-            for _ in 0..=random.below(3) {
-                let place = random.below(damaged.len());
-                damaged[place] = random.below(256) as u8;
-            }
-            read_all(&damaged);
-        }
-        for part in 0..100 {
-            read_all(&bytes[..bytes.len() * part / 100]);
-        }
+        damage(&bytes, 300, BUDGET, |bytes| {
+            read_all(bytes);
+        });
     }
+}
+
+#[test]
+fn promises_of_terabytes_cost_nothing() {
+    let mut bytes = fixture("axes.h5");
+    // The lengths of `sideways`, and the most that they may grow to.
+    let lengths = [3_u64, 20].map(u64::to_le_bytes).concat();
+    let huge = [3_u64, 1 << 40].map(u64::to_le_bytes).concat();
+    let places: Vec<usize> = (0..bytes.len() - 16).filter(|&place| bytes[place..place + 16] == lengths).collect();
+    assert!(!places.is_empty());
+    for place in places {
+        bytes[place..place + 16].copy_from_slice(&huge);
+    }
+    let read = || {
+        let refused = inspect_bytes(Path::new("x.h5"), &bytes, &arrays(&["sideways"]));
+        assert!(refused.is_err());
+        let axes = Selection { axes: Some("ct".parse().unwrap()), ..arrays(&["sideways"]) };
+        assert!(inspect_bytes(Path::new("x.h5"), &bytes, &axes).is_err());
+    };
+    let held = allocation_counter::measure(read).bytes_max;
+    assert!(held < 1 << 20, "{held}");
 }
 
 #[test]
