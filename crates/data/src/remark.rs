@@ -55,6 +55,14 @@ pub enum Remark {
         /// How many.
         lost: usize,
     },
+    /// Words that stand still for many rows, and change at times: perhaps they tell sequences apart.
+    #[error("`{column}` holds words that stand still for {runs} stretches of rows; they were taken as one sequence")]
+    MayBeLabel {
+        /// The column.
+        column: String,
+        /// How many stretches.
+        runs: usize,
+    },
     /// A column that holds no numbers was left out.
     #[error("`{column}` holds {what}, it is no channel")]
     LeftOut {
@@ -172,6 +180,7 @@ impl Remark {
             | Self::Staircase { .. }
             | Self::ByPlace { .. }
             | Self::NoClock { .. }
+            | Self::MayBeLabel { .. }
             | Self::NumbersLeftOut { .. }
             | Self::Suspicion { .. } => Level::Warning,
             Self::MissingValues { missing, samples, .. } if 2 * missing > *samples => Level::Warning,
@@ -186,6 +195,7 @@ impl Remark {
             Self::Clock { column } | Self::Counter { column } | Self::Label { column, .. } => {
                 Some(format!("`channels = [\"{column}\", ...]` takes it as a channel"))
             }
+            Self::MayBeLabel { .. } => Some("call it `sequence` if it tells sequences apart".to_owned()),
             Self::Uneven { .. } => Some("`period = SECONDS` brings them to even times".to_owned()),
             Self::Bursts { .. } => Some("`time = \"header\"` goes by the stamps in the messages".to_owned()),
             Self::Suspicion { suspicion } => suspicion.help(),

@@ -157,7 +157,8 @@ fn stamped(dimension: &str) -> Result<(Vec<f64>, Vec<f64>), &str> {
 
 /// Times of series are counts or seconds.
 fn nanoseconds(times: &[f64]) -> Vec<i64> {
-    times.iter().map(|time| (time * 1e9) as i64).collect()
+    let first = times.first().copied().unwrap_or(0.0);
+    times.iter().map(|time| ((time - first) * 1e9).round() as i64).collect()
 }
 
 #[cfg(test)]

@@ -336,3 +336,76 @@ fn remarks_are_json_with_a_message() {
     assert_eq!(json["message"], "`time` is a clock, no channel");
     assert!(json["help"].as_str().unwrap().contains("channels"));
 }
+
+/// A table of 40 rows that `row` writes, behind `head`, read as a file of this name.
+fn table(name: &str, head: &str, row: impl Fn(usize) -> String) -> Reading {
+    let rows: String = (0..40).map(|k| row(k) + "\n").collect();
+    let text = format!("{head}{rows}");
+    scrnn_data::inspect_bytes(Path::new(name), text.as_bytes(), &Selection::default())
+        .unwrap_or_else(|error| panic!("{error}: {text}"))
+}
+
+/// A movement.
+fn moves(k: usize) -> String {
+    format!("{:.4},{:.4}", (k as f64 * 0.1).sin(), (k as f64 * 0.1).cos())
+}
+
+#[test]
+fn other_recorders_tables_are_read() {
+    let vicon = "Trajectories\n100\n,,Bob:A,,,\nFrame,Sub Frame,X,Y,Z\n,,mm,mm,mm\n";
+    let vicon = table("x.csv", vicon, |k| format!("{},0,{},{k}.5", k + 1, moves(k)));
+    assert_eq!((shape(&vicon), vicon.facts.units[1].as_deref()), ((vec!["X", "Y", "Z"], vec![40]), Some("mm")));
+    let phone = table("x.csv", "time,seconds_elapsed,z,y\n", |k| {
+        format!("{},{},{}", 1_698_501_144_401_265_200_i64 + 10_000_000 * k as i64, k as f64 * 0.01, moves(k))
+    });
+    assert_eq!((shape(&phone).0, phone.period), (vec!["z", "y"], Some(0.01)));
+    let tum = table("x.txt", "# ground truth\n# timestamp tx ty\n", |k| {
+        format!("{:.4} {}", 1_305_031_102.1758 + 0.01 * k as f64, moves(k).replace(',', " "))
+    });
+    assert_eq!((shape(&tum).0, tum.period), (vec!["tx", "ty"], Some(0.01)));
+    let r = table("x.txt", "\"a\" \"b\"\n", |k| format!("\"{}\" {}", k + 1, moves(k).replace(',', " ")));
+    assert_eq!((shape(&r).0, first(&r)), (vec!["a", "b"], &[0.0, 1.0][..]));
+    let closed = table("x.txt", "", |k| format!("{};", moves(k)));
+    assert_eq!(shape(&closed).0, ["y1", "y2"]);
+    let markers =
+        table("x.tsv", "FREQUENCY\t100\nMARKER_NAMES\tA\n", |k| format!("{}\t0.5", moves(k).replace(',', "\t")));
+    assert_eq!(shape(&markers).0, ["A.X", "A.Y", "A.Z"]);
+    let german = table("x.csv", "Zeit [s];Winkel [Grad]\n", |k| {
+        format!("{:.2};{:.4}", k as f64 * 0.01, (k as f64).sin()).replace('.', ",")
+    });
+    assert_eq!((shape(&german).0, german.period), (vec!["Winkel [Grad]"], Some(0.01)));
+    let pair = table("x.csv", "/j/header/stamp/sec,/j/header/stamp/nanosec,/j/a,/j/b\n", |k| {
+        format!("{},{},{}", 1_700_000_000 + k / 10, k % 10 * 100_000_000, moves(k))
+    });
+    assert_eq!((shape(&pair).0, pair.period), (vec!["/j/a", "/j/b"], Some(0.1)));
+}
+
+#[test]
+fn sequences_are_told_apart_by_labels_and_restarts() {
+    let names =
+        |reading: &Reading| reading.data.sequences().iter().map(|sequence| sequence.name.clone()).collect::<Vec<_>>();
+    let trials = table("x.csv", "subject,trial,x,y\n", |k| format!("S{},{},{}", k / 20, k / 10 % 2, moves(k)));
+    assert_eq!(names(&trials), ["S0/0", "S0/1", "S1/0", "S1/1"]);
+    let restart = table("x.csv", "time,x,y\n", |k| format!("{},{}", (k % 20) as f64 * 0.01, moves(k)));
+    assert_eq!((names(&restart), restart.period), (vec!["1".to_owned(), "2".into()], Some(0.01)));
+    assert!(says(&restart, "`time` begins again, first at row 21: 2 sequences"));
+    let frames = table("x.csv", "frame,x,y\n", |k| format!("{},{}", k % 10, moves(k)));
+    assert_eq!(shape(&frames).1, [10; 4]);
+    // A trial that changes at each row counts rows; words that stand still are said.
+    let counted = table("x.csv", "trial,x,y\n", |k| format!("{k},{}", moves(k)));
+    assert_eq!(shape(&counted), (vec!["x", "y"], vec![40]));
+    let gestures =
+        table("x.csv", "gesture,x,y\n", |k| format!("{},{}", if k < 20 { "wave" } else { "point" }, moves(k)));
+    assert!(says(&gestures, "stand still for 2 stretches"), "{:?}", gestures.remarks);
+}
+
+#[test]
+fn a_name_alone_does_not_make_a_clock() {
+    let reading = table("x.csv", "time,x\n", moves);
+    assert_eq!(shape(&reading).0, ["time", "x"]);
+    assert!(says(&reading, "`time` does not rise"));
+    let ticks = table("x.csv", "count,x,y\n", |k| format!("{},{}", [0, 1, 2, 1][k % 4], moves(k)));
+    assert_eq!(shape(&ticks).0, ["count", "x", "y"]);
+    let values = table("x.csv", "t,x,y\n", |k| format!("{},{}", 20 - (k as i64 - 20).abs(), moves(k)));
+    assert_eq!(shape(&values).0, ["t", "x", "y"]);
+}

@@ -5,6 +5,9 @@ use super::tree;
 use crate::front::Front;
 use crate::problem::FormatProblem;
 
+/// Chunks that an array of addresses may have room for.
+const MOST_CHUNKS: u64 = 1 << 60;
+
 /// How a data set is cut into chunks.
 #[derive(Debug)]
 pub struct Grid {
@@ -240,6 +243,7 @@ impl Grid {
             let (count, length) = (1_usize << (group / 2).min(60), blocks.length(group).ok_or_else(broken)?);
             let many =
                 u64::try_from(length).ok().and_then(|length| length.checked_mul(count as u64)).ok_or_else(broken)?;
+            let next = first.checked_add(many).filter(|&next| next < MOST_CHUNKS).ok_or_else(broken)?;
             if group < direct {
                 for number in 0..count as u64 {
                     let block = file.address(&mut front).ok_or_else(broken)?;
@@ -250,7 +254,7 @@ impl Grid {
             } else if let Some(secondary) = file.address(&mut front).ok_or_else(broken)? {
                 self.secondary(file, &blocks, secondary, (count, length), first, each)?;
             }
-            first = first.checked_add(many).ok_or_else(broken)?;
+            first = next;
             if front.0.len() < file.offsets {
                 break;
             }

@@ -182,7 +182,12 @@ fn chunked<'a>(
     let plain_edges = version > 3 && flags & 1 != 0;
     if let Some(index) = index {
         grid.each(file, index, &mut |chunk| {
-            let at_edge = chunk.origin.iter().zip(&grid.chunk).zip(&grid.shape).any(|((a, b), length)| a + b > *length);
+            let at_edge = chunk
+                .origin
+                .iter()
+                .zip(&grid.chunk)
+                .zip(&grid.shape)
+                .any(|((a, b), length)| a.saturating_add(*b) > *length);
             let filters: &[Filter] = if plain_edges && at_edge { &[] } else { &filters };
             place(file, &grid, about.kind, filters, &chunk, &mut out)
         })?;

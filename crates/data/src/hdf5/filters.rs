@@ -87,7 +87,7 @@ pub fn undo<'a>(
             .iter()
             .enumerate()
             .filter(|(index, filter)| **filter == Filter::Fletcher && applied(*index));
-        let size = size + 4 * checksums.count();
+        let size = size.saturating_add(4 * checksums.count());
         data = match filter {
             Filter::Fletcher => {
                 let length = data.len().checked_sub(4).ok_or_else(broken)?;

@@ -59,7 +59,8 @@ impl Kind {
                     8 => [64, 52, 11, 52],
                     _ => [0; 4],
                 };
-                let as_standard = [precision, exponent_at, exponent, mantissa] == standard && sign == precision - 1;
+                let as_standard =
+                    [precision, exponent_at, exponent, mantissa] == standard && sign.checked_add(1) == Some(precision);
                 // The second bit of the order is that of a VAX.
                 if as_standard && bits & 0x40 == 0 { Class::Float } else { other("floats of odd sizes") }
             }
@@ -67,7 +68,7 @@ impl Kind {
             // Enumerations are numbers with names; a truth value is one of h5py's.
             8 => {
                 let base = Self::read_base(front.0)?;
-                return Ok(Self { size, ..base });
+                return if base.size == size { Ok(base) } else { Err(broken()) };
             }
             9 if bits & 0x0f == 1 => Class::LongText,
             2 => other("times"),

@@ -306,7 +306,7 @@ fn array(file: &File<'_>, contents: &Contents, found: &Found, selection: &Select
         found: format!("{} is {} {}", found.path, shape(found), found.about.kind.name()),
         needed,
     };
-    if !found.about.kind.is_numeric() || !(1..=3).contains(&lengths.len()) {
+    if !found.about.kind.is_numeric() || !(1..=3).contains(&lengths.len()) || lengths.contains(&0) {
         return Err(unfit("numbers along one, two or three axes".to_owned()));
     }
     if file.is_matlab && lengths.len() > 2 {

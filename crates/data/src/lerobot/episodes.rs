@@ -7,6 +7,7 @@ use crate::budget::Budget;
 use crate::parquet::{Cells, Parquet};
 use crate::problem::FormatProblem;
 use crate::samples::Track;
+use crate::times;
 
 /// The frames that were read so far, by episode.
 #[derive(Debug, Default)]
@@ -19,8 +20,8 @@ struct Episode {
     values: Vec<f64>,
     /// Numbers of the frames; empty if nothing counts them.
     frames: Vec<i64>,
-    /// Nanoseconds; empty if they are not needed.
-    times: Vec<i64>,
+    /// What the clock shows; empty if it is not needed.
+    clock: Vec<f64>,
 }
 
 impl Episodes {
@@ -37,19 +38,18 @@ impl Episodes {
         let one = |name: Option<&String>| name.map(|name| leaf(name)).transpose();
         let (episode, frame) = (one(plan.episode.as_ref())?, one(plan.frame.as_ref())?);
         let clock = one(plan.clock.as_ref().map(|(name, _)| name))?;
-        let per_second = plan.clock.as_ref().map_or(1.0, |(_, per_second)| *per_second);
         let features = plan.taken().map(|feature| leaf(&feature.name)).collect::<Result<Vec<_>, _>>()?;
         let widths: Vec<usize> = plan.taken().map(|feature| feature.width).collect();
         for group in 0..file.groups() {
             let cells = |leaf: Option<usize>| leaf.map(|leaf| file.cells(group, leaf, budget)).transpose();
             let (episode, frame) = (cells(episode)?, cells(frame)?);
-            let clock = cells(clock)?.map(|cells| (cells, per_second));
+            let clock = cells(clock)?;
             let features =
                 features.iter().map(|&leaf| file.cells(group, leaf, budget)).collect::<Result<Vec<_>, _>>()?;
             let rows = file.rows(group)?;
             budget.take_values::<f64>(rows.saturating_mul(plan.channels.len() + 2))?;
             self.take_rows(rows, episode.as_ref(), frame.as_ref(), clock.as_ref(), &features, &widths, plan)?;
-            for cells in [episode, frame, clock.map(|(cells, _)| cells)].into_iter().flatten().chain(features) {
+            for cells in [episode, frame, clock].into_iter().flatten().chain(features) {
                 budget.give_back(cells.taken());
             }
         }
@@ -62,7 +62,7 @@ impl Episodes {
         rows: usize,
         episode: Option<&Cells>,
         frame: Option<&Cells>,
-        clock: Option<&(Cells, f64)>,
+        clock: Option<&Cells>,
         features: &[Cells],
         widths: &[usize],
         plan: &Plan,
@@ -100,13 +100,13 @@ impl Episodes {
                 if let Some(cells) = frame {
                     into.frames.push(whole(cells, row, plan.frame.as_ref())?);
                 }
-                if let Some((cells, per_second)) = clock {
+                if let Some(cells) = clock {
                     let missing = || FormatProblem::Misfit {
                         found: format!("row {} has no time", row + 1),
                         needed: "one in each row".to_owned(),
                     };
                     let value = cells.row(row).first().filter(|value| value.is_finite()).ok_or_else(missing)?;
-                    into.times.push((value / per_second * 1e9).round() as i64);
+                    into.clock.push(*value);
                 }
                 row += 1;
             }
@@ -120,7 +120,8 @@ impl Episodes {
     }
 
     /// The episodes in their order, each with its frames in theirs.
-    pub fn tracks(self, labelled: bool, channels: usize) -> Result<Vec<Track>, FormatProblem> {
+    pub fn tracks(self, plan: &Plan) -> Result<Vec<Track>, FormatProblem> {
+        let (labelled, channels) = (plan.episode.is_some(), plan.channels.len());
         let track = |(number, mut episode): (i64, Episode)| {
             let name = if labelled { number.to_string() } else { "1".to_owned() };
             episode.sort(channels);
@@ -130,21 +131,40 @@ impl Episodes {
                     needed: "each frame once".to_owned(),
                 });
             }
-            if let Some(pair) = episode.frames.windows(2).find(|pair| pair[1] - pair[0] > 1)
-                && episode.times.is_empty()
+            if let Some(pair) = episode.frames.windows(2).find(|pair| pair[1].saturating_sub(pair[0]) > 1)
+                && episode.clock.is_empty()
             {
                 return Err(FormatProblem::Misfit {
                     found: format!("episode {name} lacks the frames between {} and {}", pair[0], pair[1]),
                     needed: "all frames, as steps are equally spaced".to_owned(),
                 });
             }
-            Ok(Track { name, values: episode.values, times: episode.times })
+            let times = episode.times(plan).ok_or_else(|| FormatProblem::Misfit {
+                found: format!("the times of episode {name} are beyond all bounds"),
+                needed: "seconds, or whole numbers of their parts".to_owned(),
+            })?;
+            Ok(Track { name, values: episode.values, times })
         };
         self.all.into_iter().map(track).collect()
     }
 }
 
 impl Episode {
+    /// Nanoseconds, if the clock is needed.
+    fn times(&self, plan: &Plan) -> Option<Vec<i64>> {
+        let (Some(&first), Some((_, unit))) = (self.clock.first(), &plan.clock) else { return Some(Vec::new()) };
+        match unit {
+            // The difference first: it is exact where the times are large.
+            Some(per_second) => self
+                .clock
+                .iter()
+                .map(|time| Some(((time - first) / per_second * 1e9).round()).filter(|time| time.abs() < 9.2e18))
+                .map(|time| time.map(|time| time as i64))
+                .collect(),
+            None => times::nanoseconds(&self.clock),
+        }
+    }
+
     /// Brings frames that stand in another order into the order of their numbers.
     fn sort(&mut self, channels: usize) {
         if self.frames.is_sorted() || channels == 0 {
@@ -154,8 +174,8 @@ impl Episode {
         order.sort_by_key(|&row| self.frames[row]);
         let values = order.iter().flat_map(|&row| &self.values[row * channels..(row + 1) * channels]);
         self.values = values.copied().collect();
-        if !self.times.is_empty() {
-            self.times = order.iter().map(|&row| self.times[row]).collect();
+        if !self.clock.is_empty() {
+            self.clock = order.iter().map(|&row| self.clock[row]).collect();
         }
         self.frames = order.iter().map(|&row| self.frames[row]).collect();
     }

@@ -131,8 +131,7 @@ impl<'a> Reading<'a> {
             );
             samples.remarks.push(Remark::Understood { what });
         }
-        let labelled = plan.episode.is_some();
-        samples.tracks = self.episodes.tracks(labelled, plan.channels.len()).map_err(|problem| problem.at(path))?;
+        samples.tracks = self.episodes.tracks(&plan).map_err(|problem| problem.at(path))?;
         let format = if self.info.is_some() || plan.is_lerobot { "LeRobot data set" } else { "parquet table" };
         samples.facts = Facts {
             format: format.to_owned(),

@@ -52,8 +52,8 @@ pub struct Plan {
     pub episode: Option<String>,
     /// The column that counts frames.
     pub frame: Option<String>,
-    /// The column that tells the time, if nothing else does, and its values in a second.
-    pub clock: Option<(String, f64)>,
+    /// The column that tells the time, if nothing else does, and its values in a second where its type tells them.
+    pub clock: Option<(String, Option<f64>)>,
     /// Seconds between frames, if the data set says so.
     pub period: Option<f64>,
     /// Names of the channels that are taken.
@@ -81,7 +81,7 @@ impl Plan {
         let period = info.and_then(Info::period);
         let clock = first(&CLOCK).map(|name| {
             let per_second = file.leaf(&name).and_then(|leaf| file.leaves[leaf].per_second);
-            (name, per_second.unwrap_or(1.0))
+            (name, per_second)
         });
         let is_special = |name: &str| {
             !asked(name)

@@ -112,7 +112,11 @@ pub fn assemble(
                     (None, _) => "nothing",
                 };
                 let named = layout.columns[index].name.as_deref().is_some_and(|name| !name.is_empty());
-                if named || what != "nothing" {
+                let runs = 1 + kept.labels.windows(2).filter(|pair| pair[0] != pair[1]).count();
+                let stands_still = runs > 1 && runs * 4 <= kept.labels.len();
+                if !labelled && names.len() == 1 && stands_still && kept.texts.iter().all(|text| !text.is_empty()) {
+                    remarks.push(Remark::MayBeLabel { column, runs });
+                } else if named || what != "nothing" {
                     remarks.push(Remark::LeftOut { column, what: what.to_owned() });
                 } else if plans.len() == 1 {
                     is[index] = Is::Channel;
@@ -212,7 +216,10 @@ fn label(
         };
         found = true;
         let sequences = names.len();
-        if plan.name != "sequence" {
+        if kept.texts.len() == 1 && plan.name != "sequence" {
+            let what = "the same throughout".to_owned();
+            remarks.push(Remark::LeftOut { column: plan.name.clone(), what });
+        } else if plan.name != "sequence" {
             remarks.push(Remark::Label { column: plan.name.clone(), sequences });
         }
     }
@@ -264,6 +271,7 @@ fn count(plans: &[Plan], rows: &Rows, track: &[u32], is: &mut [Is], remarks: &mu
         } else if course.rises + course.restarts + course.falls == 0 && steps > 0 {
             // The same in each sequence: it tells nothing.
             is[index] = Is::Label;
+            remarks.push(Remark::LeftOut { column: plan.name.clone(), what: "the same throughout".to_owned() });
         }
     }
 }

@@ -16,10 +16,7 @@ pub enum Moment {
 /// Reads `2024-05-01T10:00:00.25Z`, `2024-05-01 10:00:00,25 +02:00`, `2024/05/01`, `10:00:00.25`.
 pub fn moment(text: &str) -> Option<Moment> {
     // Cheap, and nearly always the answer.
-    if text.len() < 5
-        || !text.as_bytes()[0].is_ascii_digit()
-        || !text.bytes().any(|b| b == b':' || b == b'-' || b == b'/')
-    {
+    if text.len() < 5 || !text.as_bytes()[0].is_ascii_digit() || !text.bytes().any(|b| b":-/.".contains(&b)) {
         return None;
     }
     let Some((days, rest)) = day(text) else {
@@ -36,10 +33,21 @@ pub fn moment(text: &str) -> Option<Moment> {
 
 /// Days since 1970, and what stands behind the date.
 fn day(text: &str) -> Option<(i128, &str)> {
-    let (year, rest) = number(text, 4, 4)?;
+    let Some((year, rest)) = number(text, 4, 4) else { return day_first(text) };
     let separator = rest.chars().next().filter(|c| matches!(c, '-' | '/'))?;
     let (month, rest) = number(&rest[1..], 1, 2)?;
     let (day, rest) = number(rest.strip_prefix(separator)?, 1, 2)?;
+    let valid = (1..=12).contains(&month) && (1..=31).contains(&day);
+    valid.then(|| (days(year, month, day), rest))
+}
+
+/// `31.12.2024`; `12/31/2024`, or `31/12/2024` where the first number can be no month.
+fn day_first(text: &str) -> Option<(i128, &str)> {
+    let (first, rest) = number(text, 1, 2)?;
+    let separator = rest.chars().next().filter(|c| matches!(c, '.' | '/'))?;
+    let (second, rest) = number(&rest[1..], 1, 2)?;
+    let (year, rest) = number(rest.strip_prefix(separator)?, 4, 4)?;
+    let (day, month) = if separator == '.' || first > 12 { (first, second) } else { (second, first) };
     let valid = (1..=12).contains(&month) && (1..=31).contains(&day);
     valid.then(|| (days(year, month, day), rest))
 }
@@ -111,6 +119,10 @@ mod tests {
         assert_eq!(stamp("2024/02/29 00:00"), 1_709_164_800 * second);
         assert_eq!(stamp("1969-12-31T23:59:59"), -second);
         assert_eq!(moment("2024-03-01"), Some(Moment::Day(1_709_251_200 * second)));
+        for text in ["01.03.2024", "3/1/2024"] {
+            assert_eq!(moment(text), Some(Moment::Day(1_709_251_200 * second)), "{text}");
+        }
+        assert_eq!(moment("31/12/1969 23:59"), Some(Moment::Stamp(-60 * second)));
         assert_eq!(moment("10:30:00.5"), Some(Moment::Clock(37_800 * second + 500_000_000)));
     }
 

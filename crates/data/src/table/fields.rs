@@ -32,7 +32,8 @@ impl Separator {
         };
         let mut outside = [false; 3];
         let (mut quoted, mut listed, mut begins) = (false, false, true);
-        for c in line.trim_end().chars() {
+        // Some close each line with a semicolon.
+        for c in line.trim_end().trim_end_matches(';').chars() {
             quoted ^= c == '"';
             // A list in a cell; brackets within a name are part of it.
             listed = (listed || begins && c == '[') && c != ']';
@@ -42,7 +43,11 @@ impl Separator {
             }
         }
         let found = candidates.into_iter().zip(outside).find(|(_, found)| *found);
-        let found = found.map_or(Self::Whitespace, |(candidate, _)| Self::Character(candidate));
+        let found = match found {
+            Some((candidate, _)) => Self::Character(candidate),
+            None if line.trim_end().ends_with(';') => Self::Character(';'),
+            None => Self::Whitespace,
+        };
         // Between tabs or spaces, commas may be decimal ones: if all that stands there are numbers then.
         if found == Self::Character(',') {
             let others = [Self::Character('\t'), Self::Whitespace];
@@ -83,7 +88,10 @@ pub struct Field<'a> {
 /// Splits a line; `into` is cleared first.
 pub fn split<'a>(line: &'a str, separator: Separator, into: &mut Vec<Field<'a>>) {
     into.clear();
-    let line = line.trim_end();
+    let mut line = line.trim_end();
+    if separator != Separator::Character(';') {
+        line = line.strip_suffix(';').unwrap_or(line);
+    }
     let ends_field = |c: char| match separator {
         Separator::Character(separator) => c == separator,
         Separator::Whitespace => c.is_whitespace(),
@@ -155,6 +163,11 @@ mod tests {
         assert_eq!(detect("1,\t2"), Separator::Character(','));
         assert_eq!(detect("40,038\t53,489"), Separator::Character('\t'));
         assert_eq!(detect("1, 2"), Separator::Character(','));
+        assert_eq!(
+            (detect("1,2;"), detect("1;"), detect("1;2;")),
+            (Separator::Character(','), Separator::Character(';'), Separator::Character(';'))
+        );
+        assert_eq!(fields("1,2;", Separator::Character(',')), ["1", "2"]);
         assert_eq!(detect("1,5 2,5"), Separator::Whitespace);
         assert_eq!(detect("\"a, b\" 2"), Separator::Whitespace);
         assert_eq!(Separator::detect("a, b\t2", DetectionOrder::TabFirst), Separator::Character('\t'));

@@ -29,6 +29,11 @@ const CLOCKS: &[&str] = &[
     "ts",
     "date",
     "date_time",
+    "zeit",
+    "temps",
+    "tiempo",
+    "tempo",
+    "datum",
     "datetime",
     "utc",
     "clock",
@@ -46,6 +51,8 @@ const CLOCKS: &[&str] = &[
 ];
 const COUNTERS: &[&str] = &[
     "frame",
+    "sub_frame",
+    "subframe",
     "frames",
     "frame_index",
     "frame_id",
@@ -182,7 +189,7 @@ pub fn role(index: usize, name: &str) -> Option<Role> {
         }
     }
     let is_clock = CLOCKS.contains(&whole)
-        || ["_time", "timestamp", "_stamp", "time_since_start", "_datetime"]
+        || ["_time", "_elapsed", "timestamp", "_stamp", "time_since_start", "_datetime"]
             .iter()
             .any(|ending| whole.ends_with(ending))
         || whole.starts_with("time_") && ["s", "ms", "us", "ns", "sec", "secs", "seconds"].contains(&&whole[5..])
@@ -269,7 +276,17 @@ mod tests {
         ] {
             assert_eq!(role(1, name), Some(Role::Clock { sure: true }), "{name}");
         }
-        for name in ["t", "sim_time", "time_ms", "timestamp_ns", "log time", "Elapsed [ms]", "unix_timestamp"] {
+        for name in [
+            "t",
+            "sim_time",
+            "time_ms",
+            "timestamp_ns",
+            "log time",
+            "Elapsed [ms]",
+            "unix_timestamp",
+            "seconds_elapsed",
+            "Zeit [s]",
+        ] {
             assert_eq!(role(1, name), Some(Role::Clock { sure: false }), "{name}");
         }
         for name in ["frame", "Frame", "frame_index", "index", "field.header.seq", "Sample #".trim_end_matches(" #")] {

@@ -141,7 +141,7 @@ pub fn plans(layout: &Layout, selection: &Selection) -> Vec<Plan> {
         let times = moments
             || column.holds != Holds::Words
                 && matches!(role, Some(Role::Clock { .. } | Role::Seconds(_) | Role::Nanoseconds(_)));
-        let labels = matches!(role, Some(Role::Label { .. }));
+        let labels = matches!(role, Some(Role::Label { .. })) || column.holds == Holds::Words && !asked;
         let counts = matches!(role, Some(Role::Counter { .. } | Role::Label { .. })) && column.holds == Holds::Numbers;
         Plan { name, role, asked, numbers: asked || may_be_channel || counts, times, labels, parts }
     };
