@@ -145,8 +145,9 @@ fn most_threads(place: &Place, line: &str) -> usize {
 fn one_thread_means_one_for_seeds_and_worlds_alike() {
     let place = Place::new();
     for line in ["reproduce sinusoid --epochs 600 --seeds 3", "data reach --sequences 4 --steps 24"] {
-        let most =
-            |threads: usize| most_threads(&place, &format!("{line} --threads {threads} --out with-{threads}.csv"));
+        let most = |threads: usize| {
+            most_threads(&place, &format!("{line} --threads {threads} --out {}-{threads}.csv", line.len()))
+        };
         let (one, two) = (most(1), most(2));
         // One waits for signals.
         assert!((1..=2).contains(&one) && two > one, "{line}: {one} and {two} threads");

@@ -241,7 +241,9 @@ fn plan(path: &str, arrays: &[Array], selection: &Selection) -> Result<Plan, Fil
         [_] => return Ok(Plan::Alone),
         _ => {}
     }
-    if let Some(axes) = selection.axes {
+    // Steps x channels is what several arrays are taken for anyway; who says so need not be asked.
+    let as_written = selection.axes == Some(Axes { sequences: None, steps: 0, channels: Some(1) });
+    if let Some(axes) = selection.axes.filter(|_| !as_written) {
         let help = "with `axes`, take one array: `arrays = [\"...\"]`".to_owned();
         let found = arrays.iter().map(|array| array.name.as_str()).collect::<Vec<_>>().join(", ");
         return Err(error(path, "", ArrayProblem::Axes { axes: axes.to_string(), found }, help));
@@ -263,7 +265,9 @@ fn plan(path: &str, arrays: &[Array], selection: &Selection) -> Result<Plan, Fil
         if stems.len() == 1 && same_channels && flat {
             let mut order: Vec<usize> = (0..arrays.len()).collect();
             order.sort_by(|a, b| natural(&arrays[*a].name, &arrays[*b].name));
-            steps_for_channels(path, arrays)?;
+            if !as_written {
+                steps_for_channels(path, arrays)?;
+            }
             return Ok(Plan::Sequences(order));
         }
         if stems.len() > 1 && flat {
@@ -293,7 +297,9 @@ fn plan(path: &str, arrays: &[Array], selection: &Selection) -> Result<Plan, Fil
         return Ok(Plan::Groups(vec![("1".to_owned(), (0..arrays.len()).collect())]));
     }
     if same_channels && flat {
-        steps_for_channels(path, arrays)?;
+        if !as_written {
+            steps_for_channels(path, arrays)?;
+        }
         return Ok(Plan::Sequences((0..arrays.len()).collect()));
     }
     let found =
