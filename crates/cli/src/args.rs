@@ -95,7 +95,8 @@ impl Part {
     /// What it selects in the file at `path`; where it is silent, what `learned` of its training's data says.
     pub fn of(&self, path: &Path, learned: Option<Selection>) -> Selection {
         let Selection { topics, period, channels, .. } = learned.unwrap_or_default();
-        let recording = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"));
+        let is = |wanted: &str| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(wanted));
+        let recording = path.is_dir() || is("mcap") || is("db3");
         Selection {
             topics: match &self.topic {
                 Some(topic) => vec![topic.clone()],
