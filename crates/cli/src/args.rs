@@ -94,7 +94,7 @@ fn period(text: &str) -> std::result::Result<f64, String> {
 impl Part {
     /// What it selects in the file at `path`; where it is silent, what `learned` of its training's data says.
     pub fn of(&self, path: &Path, learned: Option<Selection>) -> Selection {
-        let Selection { topics, period, channels, .. } = learned.unwrap_or_default();
+        let Selection { topics, period, channels, arrays, unwrap, .. } = learned.unwrap_or_default();
         let is = |wanted: &str| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(wanted));
         let recording = path.is_dir() || is("mcap") || is("db3");
         Selection {
@@ -105,6 +105,8 @@ impl Part {
             },
             period: self.period.or(period.filter(|_| recording)),
             channels: self.channels.clone().or(channels),
+            arrays: if ["npz", "hdf5", "h5", "mat"].into_iter().any(is) { arrays } else { Vec::new() },
+            unwrap,
             ..Selection::default()
         }
     }
