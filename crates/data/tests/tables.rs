@@ -360,7 +360,7 @@ fn other_recorders_tables_are_read() {
     });
     assert_eq!((shape(&phone).0, phone.period), (vec!["z", "y"], Some(0.01)));
     let tum = table("x.txt", "# ground truth\n# timestamp tx ty\n", |k| {
-        format!("{:.4} {}", 1_305_031_102.1758 + 0.01 * k as f64, moves(k).replace(',', " "))
+        format!("{:.4} {}", 1_305_031_102.175_8 + 0.01 * k as f64, moves(k).replace(',', " "))
     });
     assert_eq!((shape(&tum).0, tum.period), (vec!["tx", "ty"], Some(0.01)));
     let r = table("x.txt", "\"a\" \"b\"\n", |k| format!("\"{}\" {}", k + 1, moves(k).replace(',', " ")));
