@@ -99,7 +99,7 @@ fn what_a_recording_holds_is_shown_and_what_it_lacks_is_said() {
     assert!(told.contains("cut.mcap: the recording is cut off") && told.contains("mcap recover"), "{told}");
     place.write("table.csv", "y\n1\n2\n");
     let (_, told) = place.fails(2, "inspect table.csv --topic /joint_states");
-    assert!(told.contains("table.csv is a CSV table; `topics` goes with .mcap only"), "{told}");
+    assert!(told.contains("table.csv is a CSV table; `topics` goes with .mcap, .db3, .bag only"), "{told}");
     let (_, told) = place.fails(2, "data sinusoid --steps 5 --out wave.mcap");
     assert!(told.contains("wave.mcap would be a recording of a world") && !place.path("wave.mcap").exists(), "{told}");
     place.write("bad.toml", experiment("files = [\"arm.mcap\"]\nperiod = -1.0"));

@@ -2,15 +2,15 @@
 //!
 //! | extension | what it holds | more |
 //! |---|---|---|
-//! | `.csv`, `.txt`, `.dat`, `.tsv` | lines of numbers, with or without a header | [`table`] |
-//! | `.npy` | one numpy array: sequences x steps x channels, steps x channels, or steps | [`npy`] |
-//! | `.npz` | numpy arrays: sequences, or groups of channels | [`npz`] |
-//! | `.mcap`, `.db3`, folders of bags | a recording; messages are samples. Only read | [`recording`] |
-//! | `.parquet`, folders of LeRobot | a data set of demonstrations, or a table in columns | [`lerobot`] |
-//! | `.hdf5`, `.h5` | demonstrations, or any data sets | [`hdf5`] |
-//! | `.mat` | MATLAB's matrices (version 5, or 7.3, which is HDF5) | [`mat`] |
-//! | `.bvh` | motion capture: a skeleton's angles | [`bvh`] |
-//! | `.ts` | labelled series | [`series`] |
+//! | `.csv`, `.txt`, `.dat`, `.tsv` | lines of numbers, with or without a header | `table` |
+//! | `.npy` | one numpy array: sequences x steps x channels, steps x channels, or steps | `npy` |
+//! | `.npz` | numpy arrays: sequences, or groups of channels | `npz` |
+//! | `.mcap`, `.db3`, folders of bags | a recording; messages are samples. Only read | `recording` |
+//! | `.parquet`, folders of LeRobot | a data set of demonstrations, or a table in columns | `lerobot` |
+//! | `.hdf5`, `.h5` | demonstrations, or any data sets | `hdf5` |
+//! | `.mat` | MATLAB's matrices (version 5, or 7.3, which is HDF5) | `mat` |
+//! | `.bvh` | motion capture: a skeleton's angles | `bvh` |
+//! | `.ts` | labelled series | `series` |
 //!
 //! A format is one file and one line in [`format::FORMATS`]. Each reader gets a [`source::Source`] with a
 //! [`budget::Budget`] and makes [`samples::Samples`]; from there [`samples::Samples::finish`] is the one way to a

@@ -352,9 +352,6 @@ fn moves(k: usize) -> String {
 
 #[test]
 fn other_recorders_tables_are_read() {
-    let vicon = "Trajectories\n100\n,,Bob:A,,,\nFrame,Sub Frame,X,Y,Z\n,,mm,mm,mm\n";
-    let vicon = table("x.csv", vicon, |k| format!("{},0,{},{k}.5", k + 1, moves(k)));
-    assert_eq!((shape(&vicon), vicon.facts.units[1].as_deref()), ((vec!["X", "Y", "Z"], vec![40]), Some("mm")));
     let phone = table("x.csv", "time,seconds_elapsed,z,y\n", |k| {
         format!("{},{},{}", 1_698_501_144_401_265_200_i64 + 10_000_000 * k as i64, k as f64 * 0.01, moves(k))
     });

@@ -111,7 +111,7 @@
 //! - The same data, settings and seed give the same bits, whatever the number of threads.
 //! - Samples and predictions are in the network's units; [`scaling`] leads to and from the data's own.
 //! - Sequences, steps, channels and units count from 0.
-//! - A training whose values become non-finite is no error but an [`Outcome`](learning::Outcome): it is rolled back to the
+//! - A training whose values become non-finite is no error but an [`Outcome`]: it is rolled back to the
 //!   last good epoch and says where it happened.
 
 #[cfg(feature = "analysis")]
