@@ -152,9 +152,9 @@ fn numpy_computes_from_a_checkpoint_what_the_open_loop_generates() {
 fn files_of_numpy_and_pandas_train_alike_in_every_form() {
     let Some(place) = Place::new() else { return };
     place.agrees("write_data.py", ".");
+    // Arrays of one length and other names (named.npz) are channels of one recording, not sequences.
     let files = [
         "plain.npz",
-        "named.npz",
         "one.npz",
         "compressed.npz",
         "float32.npz",
@@ -179,6 +179,7 @@ fn files_of_numpy_and_pandas_train_alike_in_every_form() {
         assert_eq!(train(file).to_bits(), first.to_bits(), "{file}");
     }
     assert_ne!(train("ragged.npz").to_bits(), first.to_bits());
+    assert_ne!(train("named.npz").to_bits(), first.to_bits());
 }
 
 #[test]

@@ -364,9 +364,6 @@ fn other_recorders_tables_are_read() {
     assert_eq!((shape(&r).0, first(&r)), (vec!["a", "b"], &[0.0, 1.0][..]));
     let closed = table("x.txt", "", |k| format!("{};", moves(k)));
     assert_eq!(shape(&closed).0, ["y1", "y2"]);
-    let markers =
-        table("x.tsv", "FREQUENCY\t100\nMARKER_NAMES\tA\n", |k| format!("{}\t0.5", moves(k).replace(',', "\t")));
-    assert_eq!(shape(&markers).0, ["A.X", "A.Y", "A.Z"]);
     let german = table("x.csv", "Zeit [s];Winkel [Grad]\n", |k| {
         format!("{:.2};{:.4}", k as f64 * 0.01, (k as f64).sin()).replace('.', ",")
     });

@@ -218,12 +218,6 @@ impl Layout {
                 return Ok(());
             }
         }
-        // Qualisys names each marker once, over its three coordinates.
-        if names[0] == "MARKER_NAMES" && found == 3 * (needed - 1) {
-            let marker = |name: &Cow<'_, str>| ["X", "Y", "Z"].map(|axis| Cow::Owned(format!("{name}.{axis}")));
-            *names = names[1..].iter().flat_map(marker).collect();
-            return Ok(());
-        }
         let whole = |text: &str| !text.is_empty() && text.trim_start_matches('-').bytes().all(|b| b.is_ascii_digit());
         if found == 2 * needed
             && cells.iter().all(|cell| whole(&cell.text))
