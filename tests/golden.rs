@@ -101,7 +101,7 @@ fn newer_versions_are_refused_with_their_number() {
         let told = String::from_utf8_lossy(&output.stderr).replace('\u{2502}', " ");
         let told = told.split_whitespace().collect::<Vec<_>>().join(" ");
         assert_eq!(output.status.code(), Some(2), "{line}: {told}");
-        assert!(told.contains("format version 9 is newer than 1, which this program reads"), "{line}: {told}");
+        assert!(told.contains("format version 9 is newer than 2, which this program reads"), "{line}: {told}");
     }
     let mut bytes = fs::read(folder.join("arm.mcap")).unwrap();
     bytes[5] = b'3';

@@ -69,12 +69,15 @@ pub fn train(
     if experiment.data.files.is_some() {
         introduce(experiment, &source, messages);
     }
-    let topology = experiment.topology(source.data.channels().len())?;
+    let topology = experiment.bare_topology(source.data.channels().len())?;
     source.data.check_for(&topology)?;
     refuse_unbounded(&source.data, &topology)?;
     let scaling = experiment.data.scaling_for(&source.data)?;
     let scaled = scaling.apply(&source.data);
-    warn_out_of_reach(&scaled, messages);
+    let topology = experiment.topology(&scaled)?;
+    if !topology.has_linear_mean() && topology.skip().is_none() {
+        warn_out_of_reach(&scaled, messages);
+    }
 
     let (network, initial_states) = initialize(&topology, scaled.sequences().len(), experiment.seed);
     let mut learner = Learner::new(network, initial_states, &scaled, experiment.plan(), engine)?;
@@ -161,7 +164,8 @@ pub fn still_channels(data: &Dataset, delay: usize) -> Vec<String> {
     let n = data.channels().len();
     let predicted = || data.sequences().iter().filter_map(|sequence| sequence.values().get(delay * n..));
     let still = |i: usize| {
-        let mut samples = predicted().flat_map(|values| values.chunks_exact(n)).map(|sample| sample[i]);
+        let samples = predicted().flat_map(|values| values.chunks_exact(n)).map(|sample| sample[i]);
+        let mut samples = samples.filter(|value| !value.is_nan());
         let first = samples.next();
         samples.all(|sample| Some(sample) == first)
     };
@@ -194,10 +198,20 @@ fn write_experiment(run: &RunFolder, experiment: &Experiment) -> Result<()> {
     run.write(EXPERIMENT, format!("{head}{text}").as_bytes())
 }
 
-/// The first xi samples of each sequence: what a closed loop starts from.
+/// The first xi samples of each sequence: what a closed loop starts from. For a value that is missing stands what stood in for it as an
+/// input.
 fn first_inputs(scaled: &Dataset, delay: usize) -> Vec<f64> {
-    let values = delay * scaled.channels().len();
-    scaled.sequences().iter().flat_map(|sequence| &sequence.values()[..values]).copied().collect()
+    let n = scaled.channels().len();
+    let of = |sequence: &scrnn::dataset::Sequence| {
+        let mut last = vec![0.0; n];
+        let mut values = Vec::with_capacity(delay * n);
+        for sample in sequence.values()[..delay * n].chunks_exact(n) {
+            last.iter_mut().zip(sample).filter(|(_, x)| !x.is_nan()).for_each(|(last, x)| *last = *x);
+            values.extend_from_slice(&last);
+        }
+        values
+    };
+    scaled.sequences().iter().flat_map(of).collect()
 }
 
 /// The mean units reach from -1 to 1: samples beyond cannot be predicted.

@@ -57,7 +57,7 @@ pub(crate) fn run<S: Simd>(
     span_start: usize,
     trajectory: &mut Trajectory,
 ) {
-    let (n, n_x, n_c) = (block.columns(), packed.n_x, packed.n_c);
+    let (n, n_y, n_c) = (block.columns(), packed.n_y, packed.n_c);
     let (state_stride, delta_stride) = (packed.state_stride, packed.delta_stride);
     let first = range.start;
     for k in range.rev() {
@@ -74,10 +74,10 @@ pub(crate) fn run<S: Simd>(
             if k == 0 {
                 outputs.fill(0.0);
             } else {
-                let step = ((k - 1) * n + column) * n_x;
-                copy_few(&mut outputs[..n_x], &trajectory.mean[step..step + n_x]);
-                if packed.n_out > n_x {
-                    copy_few(&mut outputs[n_x..], &trajectory.variance[step..step + n_x]);
+                let step = ((k - 1) * n + column) * n_y;
+                copy_few(&mut outputs[..n_y], &trajectory.mean[step..step + n_y]);
+                if packed.n_out > n_y {
+                    copy_few(&mut outputs[n_y..], &trajectory.variance[step..step + n_y]);
                 }
             }
         }

@@ -11,14 +11,16 @@ use safetensors::tensor::{Dtype, Metadata, TensorInfo, View};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
+use crate::features::Skip;
 use crate::initial_states::InitialStates;
 pub use crate::learning::{OptimiserState, StateTensor};
 use crate::parameters::{Block, Parameters};
 use crate::scaling::Scaling;
 use crate::topology::{Group, Prediction, Topology};
 
-/// The version of the format that is written, and the newest that is read.
-pub const FORMAT_VERSION: u64 = 1;
+/// The newest version of the format. It is written where the network has what version 1 does not know: linear means, velocity inputs,
+/// a skip connection; all else is written as version 1. Both are read.
+pub const FORMAT_VERSION: u64 = 2;
 
 /// The one metadata key. The container keeps its keys in a hash map: with two, bytes would differ between runs.
 const KEY: &str = "scrnn";
@@ -160,10 +162,10 @@ impl Checkpoint {
         let receives = unit_rules(|group| group.receives_input);
         let drives = unit_rules(|group| group.drives_output);
         let learns = unit_rules(|group| group.learns_initial_state);
-        let (units, channels) = (self.topology.context_units(), self.topology.channels());
+        let (units, inputs) = (self.topology.context_units(), self.topology.inputs());
         for (name, tensor) in self.tensors() {
             let exists: &dyn Fn(usize) -> bool = match name.as_str() {
-                "context_from_input" => &|index| receives[index / channels],
+                "context_from_input" => &|index| receives[index / inputs],
                 "mean_from_context" | "variance_from_context" => &|index| drives[index % units],
                 "initial_state" | "initial_state_mean" => &|index| learns[index % units],
                 _ => continue,
@@ -347,6 +349,13 @@ struct TopologyRecord {
     prediction: PredictionRecord,
     variance_floor: f64,
     groups: Vec<Group>,
+    /// From version 2 on.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    linear_mean: bool,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    velocity_inputs: Option<Vec<f64>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    skip: Option<Skip>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -367,7 +376,7 @@ struct OptimiserRecord {
 impl Record {
     fn of(checkpoint: &Checkpoint) -> Self {
         Self {
-            format_version: FORMAT_VERSION,
+            format_version: if checkpoint.topology.is_of_the_thesis() { 1 } else { FORMAT_VERSION },
             epoch: checkpoint.epoch,
             channels: checkpoint.channels.clone(),
             sequences: checkpoint.sequences.clone(),
@@ -379,6 +388,9 @@ impl Record {
                 },
                 variance_floor: checkpoint.topology.variance_floor(),
                 groups: checkpoint.topology.groups().to_vec(),
+                linear_mean: checkpoint.topology.has_linear_mean(),
+                velocity_inputs: checkpoint.topology.velocity_inputs().map(<[f64]>::to_vec),
+                skip: checkpoint.topology.skip().cloned(),
             },
             optimiser: OptimiserRecord {
                 tensors: checkpoint.optimiser.tensors.iter().map(|tensor| tensor.name.clone()).collect(),
@@ -396,7 +408,7 @@ impl Record {
         }
         let broken = |error| refusal(format!("the JSON of metadata key {KEY}: {error}"));
         match serde_json::from_str(text).map_err(broken)? {
-            Version { format_version: FORMAT_VERSION } => serde_json::from_str(text).map_err(broken),
+            Version { format_version: 1..=FORMAT_VERSION } => serde_json::from_str(text).map_err(broken),
             Version { format_version: 0 } => Err(refusal("format version 0 does not exist")),
             Version { format_version } => Err(refusal(format!(
                 "format version {format_version} is newer than {FORMAT_VERSION}, which this program reads"
@@ -414,8 +426,18 @@ impl Record {
             PredictionRecord::MeanAndVariance => Prediction::MeanAndVariance { floor },
         };
         let groups = self.topology.groups.clone();
-        Topology::new(self.channels.len(), self.topology.delay, groups, prediction)
-            .map_err(|error| refusal(error.to_string()))
+        let TopologyRecord { delay, linear_mean, velocity_inputs, skip, .. } = &self.topology;
+        let built = || {
+            let mut topology = Topology::new(self.channels.len(), *delay, groups, prediction)?.with_linear_mean(*linear_mean);
+            if let Some(deviations) = velocity_inputs {
+                topology = topology.with_velocity_inputs(deviations.clone())?;
+            }
+            if let Some(skip) = skip {
+                topology = topology.with_skip(Skip::new(skip.taps().to_vec(), skip.scale().to_vec())?)?;
+            }
+            Ok(topology)
+        };
+        built().map_err(|error: Error| refusal(error.to_string()))
     }
 
     fn optimiser(&self, stored: &mut Stored<'_>) -> Result<OptimiserState> {

@@ -2,19 +2,35 @@
 //!
 //! A sequence of L samples gives T = L - xi steps: at step t (from 0) the input is sample t and the target is
 //! sample t + xi.
+//!
+//! NaN is a missing value. As a target it does not count; as an input, the network's own prediction stands in for it, and where there
+//! was none yet, the channel's last input, or 0.
 
 use std::sync::Arc;
 
 use crate::error::{Error, Result};
 use crate::topology::Topology;
 
-/// One recorded sequence: samples x channels, row-major. Clones share the samples.
-#[derive(Debug, Clone, PartialEq)]
+/// One recorded sequence: samples x channels, row-major; NaN is a missing value. Clones share the samples.
+#[derive(Debug, Clone)]
 pub struct Sequence {
     /// A name to show; may be empty.
     pub name: String,
     channels: usize,
     values: Arc<[f64]>,
+    /// How many values are missing.
+    missing: usize,
+}
+
+/// Equal names and values; missing values are equal to each other.
+impl PartialEq for Sequence {
+    fn eq(&self, other: &Self) -> bool {
+        let same = |(a, b): (&f64, &f64)| a == b || (a.is_nan() && b.is_nan());
+        self.name == other.name
+            && self.channels == other.channels
+            && self.values.len() == other.values.len()
+            && self.values.iter().zip(&*other.values).all(same)
+    }
 }
 
 impl Sequence {
@@ -28,7 +44,29 @@ impl Sequence {
             let needed = values.len().next_multiple_of(channels.max(1));
             return Err(Error::Length { what: format!("sequence `{name}`"), found: values.len(), needed });
         }
-        Ok(Self { name, channels, values: values.into() })
+        Ok(Self::of(name, channels, values.into()))
+    }
+
+    fn of(name: String, channels: usize, values: Arc<[f64]>) -> Self {
+        let missing = values.iter().filter(|value| value.is_nan()).count();
+        Self { name, channels, values, missing }
+    }
+
+    /// How many values are missing.
+    #[must_use]
+    pub fn missing(&self) -> usize {
+        self.missing
+    }
+
+    /// How many values are there to be predicted in the first `steps` steps at this delay: steps times channels, less what is missing.
+    #[must_use]
+    pub fn targets(&self, delay: usize, steps: usize) -> usize {
+        let n = self.channels;
+        let all = (steps * n).min(self.values.len().saturating_sub(delay * n));
+        match self.missing {
+            0 => all,
+            _ => self.values[delay * n..][..all].iter().filter(|value| !value.is_nan()).count(),
+        }
     }
 
     /// Number of samples.
@@ -59,7 +97,7 @@ impl Sequence {
     #[must_use]
     pub fn truncated(&self, samples: usize) -> Self {
         let end = samples.min(self.len()) * self.channels;
-        Self { name: self.name.clone(), channels: self.channels, values: self.values[..end].into() }
+        Self::of(self.name.clone(), self.channels, self.values[..end].into())
     }
 }
 
@@ -75,7 +113,7 @@ impl Dataset {
     ///
     /// # Errors
     /// [`Error::NoSequences`], [`Error::Length`] when a sequence has another number of channels, and
-    /// [`Error::NotFinite`] with the place of the first bad sample.
+    /// [`Error::NotFinite`] with the place of the first infinite sample. NaN is taken, as a missing value.
     pub fn new(channels: Vec<String>, sequences: Vec<Sequence>) -> Result<Self> {
         if sequences.is_empty() {
             return Err(Error::NoSequences);
@@ -85,7 +123,7 @@ impl Dataset {
                 let what = format!("each sample of sequence {s}");
                 return Err(Error::Length { what, found: sequence.channels, needed: channels.len() });
             }
-            if let Some(index) = sequence.values.iter().position(|value| !value.is_finite()) {
+            if let Some(index) = sequence.values.iter().position(|value| value.is_infinite()) {
                 return Err(Error::NotFinite {
                     sequence: s,
                     step: index / channels.len(),
@@ -121,6 +159,19 @@ impl Dataset {
         self.sequences.iter().map(Sequence::len).sum()
     }
 
+    /// How many values are missing in all sequences.
+    #[must_use]
+    pub fn missing(&self) -> usize {
+        self.sequences.iter().map(Sequence::missing).sum()
+    }
+
+    /// Values over all sequences that a network of delay `delay` predicts and that are there: what a likelihood per step and channel
+    /// is divided by. Without missing values T_total N_O.
+    #[must_use]
+    pub fn total_targets(&self, delay: usize) -> usize {
+        self.sequences.iter().map(|sequence| sequence.targets(delay, sequence.len().saturating_sub(delay))).sum()
+    }
+
     /// T_total: steps over all sequences that a network of delay `delay` predicts.
     #[must_use]
     pub fn total_steps(&self, delay: usize) -> usize {
@@ -145,14 +196,14 @@ impl Dataset {
         Ok(())
     }
 
-    /// Mean and variance (divided by n) of every channel over all samples.
+    /// Mean and variance (divided by n) of every channel over all samples that are there; NaN for a channel without any.
     #[must_use]
     pub fn channel_moments(&self) -> Vec<(f64, f64)> {
-        let n = self.total_samples() as f64;
         (0..self.channels.len())
             .map(|i| {
-                let values =
-                    || self.sequences.iter().flat_map(|s| s.values.chunks_exact(s.channels)).map(move |x| x[i]);
+                let all = || self.sequences.iter().flat_map(|s| s.values.chunks_exact(s.channels)).map(move |x| x[i]);
+                let values = || all().filter(|value| !value.is_nan());
+                let n = values().count() as f64;
                 let mean = values().sum::<f64>() / n;
                 (mean, values().map(|x| (x - mean).powi(2)).sum::<f64>() / n)
             })
@@ -163,10 +214,9 @@ impl Dataset {
     #[must_use]
     pub fn map(&self, map: impl Fn(usize, f64) -> f64) -> Self {
         let n = self.channels.len();
-        let through = |sequence: &Sequence| Sequence {
-            name: sequence.name.clone(),
-            channels: n,
-            values: sequence.values.iter().enumerate().map(|(k, &x)| map(k % n, x)).collect(),
+        let through = |sequence: &Sequence| {
+            let values = sequence.values.iter().enumerate().map(|(k, &x)| map(k % n, x)).collect();
+            Sequence::of(sequence.name.clone(), n, values)
         };
         Self { channels: self.channels.clone(), sequences: self.sequences.iter().map(through).collect() }
     }
@@ -186,9 +236,9 @@ mod tests {
     #[test]
     fn a_bad_sample_is_named_by_its_place() {
         let good = Sequence::new("a", 2, vec![0.0; 6]).unwrap();
-        let bad = Sequence::new("b", 2, vec![0.0, 1.0, 2.0, f64::NAN]).unwrap();
+        let bad = Sequence::new("b", 2, vec![0.0, 1.0, 2.0, f64::INFINITY]).unwrap();
         let error = Dataset::new(Dataset::numbered_channels(2), vec![good, bad]).unwrap_err();
-        assert!(error.to_string().starts_with("sequence 1, step 1, channel y2 is NaN"), "{error}");
+        assert!(error.to_string().starts_with("sequence 1, step 1, channel y2 is inf"), "{error}");
     }
 
     #[test]

@@ -43,8 +43,8 @@ pub enum Error {
     #[error("the data set holds no sequence; needed: at least one")]
     NoSequences,
 
-    /// A sample that is NaN or infinite. Missing samples are not supported.
-    #[error("sequence {sequence}, step {step}, channel {channel} is {value}; every sample must be a finite number")]
+    /// A sample that is infinite.
+    #[error("sequence {sequence}, step {step}, channel {channel} is {value}; needed: a finite number, or NaN for a missing value")]
     NotFinite {
         /// Index of the sequence, from 0.
         sequence: usize,

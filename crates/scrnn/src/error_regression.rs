@@ -9,6 +9,8 @@
 //! without noise, and that state is moved uphill; then the window's past is overwritten with what follows from it, and
 //! so is the prediction of the next sample. Only the groups whose initial state is learned are moved.
 //!
+//! Missing values of samples (NaN) do not count; as inputs, the means that were predicted for them stand in.
+//!
 //! Channels can be left out of ln L_reg, or count in part. The gradient is exact: it also runs through the means that the window
 //! feeds back to itself. Inputs of the window's first xi steps are the means predicted before it, which stay as they were, or
 //! samples where there was no prediction yet.
@@ -27,15 +29,16 @@ use pulp::{Simd, WithSimd};
 use crate::backward::retreat;
 use crate::engine::{Engine, InstructionSet, Run};
 use crate::error::{Error, Result};
+use crate::features::Features;
 use crate::forward::{activate, advance};
 use crate::kernels::activation::{exp_slice, tanh_rows};
-use crate::kernels::panels::{Columns, Panels, Product, chains_for, multiply};
+use crate::kernels::panels::{Columns, Product, multiply};
 use crate::kernels::{ROWS, copy_few};
 use crate::likelihood::Predictions;
 use crate::network::Network;
 use crate::packed::Packed;
-use crate::parameters::Block;
 
+mod features;
 mod options;
 
 pub use options::{Ascent, ErrorRegressionOptions, Regression};
@@ -48,12 +51,12 @@ pub use options::{Ascent, ErrorRegressionOptions, Regression};
 #[derive(Debug)]
 pub struct ErrorRegression {
     packed: Packed,
-    /// Back from the context to the input; rows: channels.
-    to_input: Panels,
     set: InstructionSet,
     options: ErrorRegressionOptions,
     delay: usize,
-    floor: f64,
+    features: Features,
+    /// How many inputs from before the window are kept.
+    past: usize,
     /// Samples observed.
     observed: usize,
     /// Steps in the window, at most W.
@@ -69,6 +72,10 @@ pub struct ErrorRegression {
     variance: AVec<f64>,
     /// [row][channel]: row r is the sample that can be the input of the next row's step.
     samples: AVec<f64>,
+    /// [past + row][channel]: the sample, or its stand-in, that the next row's step took in, after those from before the window.
+    taken: AVec<f64>,
+    /// Gradients along the window, where there are features.
+    slopes: features::Slopes,
     /// [row][delta_stride]: d/du of the next row's context, then of this row's outputs.
     deltas: AVec<f64>,
     /// [row][channel]: d/du of the mean and the variance units.
@@ -104,8 +111,8 @@ impl ErrorRegression {
         engine: &Engine,
     ) -> Result<Self> {
         let topology = &network.topology;
-        let (n_x, n_c, delay) = (topology.channels(), topology.context_units(), topology.delay());
-        options.check(n_x)?;
+        let (n_y, n_c, delay) = (topology.channels(), topology.context_units(), topology.delay());
+        options.check(n_y)?;
         if initial_state.len() != n_c {
             let what = "the initial state".to_owned();
             return Err(Error::Length { what, found: initial_state.len(), needed: n_c });
@@ -113,40 +120,41 @@ impl ErrorRegression {
         let set = engine.instruction_set();
         let mut packed = Packed::new(topology, set);
         packed.fill(&network.parameters);
-        let mut to_input = Panels::zeros(n_x, n_c, chains_for(n_x), set);
-        let w_cx = network.parameters.block(Block::ContextFromInput);
-        to_input.fill(n_x, |i, k| packed.rate[k] * w_cx[k * n_x + i]);
+        let features = Features::new(topology);
+        let past = features.past().max(1);
         let window = options.window;
         let zeros = |count: usize| AVec::from_iter(64, std::iter::repeat_n(0.0, count));
-        let n_v = packed.n_out - n_x;
+        let n_v = packed.n_out - n_y;
         let rows = window + 2 + options.ahead;
         let mut regression = Self {
             internal: zeros(rows * packed.rows),
             states: zeros(rows * packed.state_stride),
-            mean: zeros((delay + rows) * n_x),
+            mean: zeros((delay + rows) * n_y),
             variance: zeros(rows * n_v),
-            samples: zeros((window + delay + 1) * n_x),
+            samples: zeros((window + delay + 1) * n_y),
+            taken: zeros((past + rows) * n_y),
+            slopes: features::Slopes::new(&features, n_y, rows),
             deltas: zeros((window + 2) * packed.delta_stride),
-            mean_delta: zeros((window + 1) * n_x),
+            mean_delta: zeros((window + 1) * n_y),
             variance_delta: zeros((window + 1) * n_v),
-            terms: zeros(window * n_x),
-            squares: zeros(window * n_x),
-            precisions: zeros(window * n_x),
+            terms: zeros(window * n_y),
+            squares: zeros(window * n_y),
+            precisions: zeros(window * n_y),
             drive: zeros(packed.rows),
             drive_with_input: zeros(packed.rows),
-            outputs: zeros(packed.rows),
+            outputs: zeros(packed.rows.max(packed.to_input.rows())),
             moves: topology.per_unit(|group| group.learns_initial_state).collect(),
             first: vec![0.0; n_c],
             second: vec![0.0; n_c],
             tail_before: vec![0.0; n_c],
             next_variance: vec![0.0; (1 + options.ahead) * n_v],
-            floor: topology.variance_floor(),
             observed: 0,
             length: 0,
             delay,
             options,
             set,
-            to_input,
+            features,
+            past,
             packed,
         };
         regression.internal[..n_c].copy_from_slice(initial_state);
@@ -154,18 +162,18 @@ impl ErrorRegression {
         Ok(regression)
     }
 
-    /// Takes in one sample of N_I values, regresses over the window, and predicts the next sample. `go_on` is asked
+    /// Takes in one sample of N_O values (NaN is a missing one), regresses over the window, and predicts the next sample. `go_on` is asked
     /// before each iteration; it lets a control loop keep its deadline. Allocates nothing.
     ///
     /// # Errors
-    /// [`Error::Length`] for a sample of another size, [`Error::Setting`] for one that is not finite; neither is taken in.
+    /// [`Error::Length`] for a sample of another size, [`Error::Setting`] for an infinite one; neither is taken in.
     pub fn observe(&mut self, sample: &[f64], go_on: &mut dyn FnMut() -> bool) -> Result<Regression> {
-        let n_x = self.packed.n_x;
-        if sample.len() != n_x {
-            return Err(Error::Length { what: "the sample".to_owned(), found: sample.len(), needed: n_x });
+        let n_y = self.packed.n_y;
+        if sample.len() != n_y {
+            return Err(Error::Length { what: "the sample".to_owned(), found: sample.len(), needed: n_y });
         }
-        if let Some(value) = sample.iter().find(|value| !value.is_finite()) {
-            let (what, needed) = ("a value of the sample", "a finite number");
+        if let Some(value) = sample.iter().find(|value| value.is_infinite()) {
+            let (what, needed) = ("a value of the sample", "a finite number, or NaN for a missing one");
             return Err(Error::Setting { what, found: value.to_string(), needed });
         }
         let mut done = Regression::default();
@@ -179,7 +187,7 @@ impl ErrorRegression {
         }
         // Sample k is the input of step k, which leads to row k + 1 as long as nothing has slid away.
         let row = self.length + (self.delay - 1).min(self.observed);
-        self.samples[row * n_x..(row + 1) * n_x].copy_from_slice(sample);
+        self.samples[row * n_y..(row + 1) * n_y].copy_from_slice(sample);
         self.observed += 1;
         if self.observed > self.delay {
             let set = self.set;
@@ -274,48 +282,65 @@ impl ErrorRegression {
     }
 
     fn mean_of(&self, row: usize) -> &[f64] {
-        &self.mean[(self.delay + row) * self.packed.n_x..][..self.packed.n_x]
+        &self.mean[(self.delay + row) * self.packed.n_y..][..self.packed.n_y]
     }
 
     /// Forgets the window's first step.
     fn slide(&mut self) {
         let (packed, rows) = (&self.packed, self.length + 2);
-        let n_v = packed.n_out - packed.n_x;
+        let n_v = packed.n_out - packed.n_y;
         self.internal.copy_within(packed.rows..rows * packed.rows, 0);
         self.states.copy_within(packed.state_stride..rows * packed.state_stride, 0);
-        self.mean.copy_within(packed.n_x.., 0);
+        self.mean.copy_within(packed.n_y.., 0);
         self.variance.copy_within(n_v.., 0);
-        self.samples.copy_within(packed.n_x.., 0);
+        self.samples.copy_within(packed.n_y.., 0);
+        self.taken.copy_within(packed.n_y.., 0);
     }
 
     /// The input of the step to row `row`: row `row - 1` of the samples, or what it was predicted as xi steps before.
     #[inline(always)]
     fn set_input(&mut self, row: usize, in_window: bool) {
-        let n_x = self.packed.n_x;
-        let shares = if in_window { &self.options.sensed_in_window } else { &self.options.sensed };
+        let (n_y, past) = (self.packed.n_y, self.past);
         // Counted from the first step ever, the step is number `step`, and its prediction was made in step - xi.
         let step = self.observed - self.delay + row - self.length;
-        let predicted = &self.mean[row * n_x..(row + 1) * n_x];
         let known = row <= self.length + self.delay;
-        let x = &mut self.states[(row - 1) * self.packed.state_stride + self.packed.rows..][..n_x];
-        if !known {
-            x.copy_from_slice(predicted);
-            return;
-        }
-        let sample = &self.samples[(row - 1) * n_x..row * n_x];
-        for i in 0..n_x {
-            x[i] = match step > self.delay {
-                true => shares[i] * sample[i] + (1.0 - shares[i]) * predicted[i],
-                false => sample[i],
+        let at = (past + row - 1) * n_y;
+        for i in 0..n_y {
+            let predicted = (step > self.delay).then(|| self.mean[row * n_y + i]);
+            let sample = if known { self.samples[(row - 1) * n_y + i] } else { f64::NAN };
+            self.taken[at + i] = match predicted {
+                Some(predicted) if sample.is_nan() => predicted,
+                Some(predicted) => {
+                    let share = self.sensed_share(i, in_window);
+                    share * sample + (1.0 - share) * predicted
+                }
+                None if !sample.is_nan() => sample,
+                // Nothing was seen or said of it yet, or what was taken in last still stands.
+                None if step > 1 => self.taken[at - n_y + i],
+                None => 0.0,
             };
         }
+        if step == 1 {
+            // A sample before the first is taken to be the first one.
+            for earlier in 0..past + row - 1 {
+                self.taken.copy_within(at..at + n_y, earlier * n_y);
+            }
+        }
+        let x = &mut self.states[(row - 1) * self.packed.state_stride + self.packed.rows..][..self.packed.n_x];
+        self.features.inputs(|back| &self.taken[at - back * n_y..][..n_y], x);
+    }
+
+    /// The share of the sample in an input that was predicted too.
+    #[inline(always)]
+    fn sensed_share(&self, channel: usize, in_window: bool) -> f64 {
+        if in_window { self.options.sensed_in_window[channel] } else { self.options.sensed[channel] }
     }
 
     /// The context's product of the step to row `row`, and with it the outputs of the row before.
     #[inline(always)]
     fn leave<S: Simd>(&mut self, simd: S, row: usize) {
         let packed = &self.packed;
-        let (n_x, n_c, rows) = (packed.n_x, packed.n_c, packed.rows);
+        let (n_y, n_c, rows) = (packed.n_y, packed.n_c, packed.rows);
         let now = &self.states[(row - 1) * packed.state_stride..][..packed.state_stride];
         let sources = [Columns { values: now, stride: packed.state_stride }];
         let matrices = [&packed.from_context];
@@ -326,9 +351,22 @@ impl ErrorRegression {
         }
         let from = n_c / ROWS * ROWS;
         tanh_rows(simd, &self.drive[from..rows], &mut self.outputs[from..rows]);
-        copy_few(&mut self.mean[(self.delay + row - 1) * n_x..][..n_x], &self.outputs[n_c..n_c + n_x]);
-        if packed.n_out > n_x {
-            copy_few(&mut self.variance[(row - 1) * n_x..][..n_x], &self.drive[n_c + n_x..n_c + 2 * n_x]);
+        let rho = if packed.linear_mean { &self.drive[n_c..n_c + n_y] } else { &self.outputs[n_c..n_c + n_y] };
+        let mean = &mut self.mean[(self.delay + row - 1) * n_y..][..n_y];
+        match self.features.has_skip() {
+            false => copy_few(mean, rho),
+            true => {
+                let at = (self.past + row - 2) * n_y;
+                self.features.guess(|back| &self.taken[at - back * n_y..][..n_y], mean);
+                let own = &mut self.slopes.rho[(row - 1) * n_y..][..n_y];
+                for (i, ((y, own), rho)) in mean.iter_mut().zip(own).zip(rho).enumerate() {
+                    *own = *rho;
+                    *y = self.features.mean(i, *y, *rho);
+                }
+            }
+        }
+        if packed.n_out > n_y {
+            copy_few(&mut self.variance[(row - 1) * n_y..][..n_y], &self.drive[n_c + n_y..n_c + 2 * n_y]);
         }
     }
 
@@ -358,21 +396,37 @@ impl ErrorRegression {
         self.leave(simd, self.length + 1);
     }
 
-    /// (2.28) and its gradient at the window's outputs.
+    /// (2.28) and its gradient at the window's outputs: d/du of the mean units, or with a skip connection d/drho.
     #[inline(always)]
     fn score<S: Simd>(&mut self, simd: S) -> (f64, f64) {
-        let n_x = self.packed.n_x;
-        let len = self.length * n_x;
-        self.mean_delta[..len].copy_from_slice(&self.mean[(self.delay + 1) * n_x..][..len]);
+        let n_y = self.packed.n_y;
+        let len = self.length * n_y;
+        // The target of row r's step is xi samples after its input.
+        let target = &self.samples[self.delay * n_y..][..len];
+        let skip = self.features.has_skip();
+        let target: &[f64] = match skip {
+            false => {
+                self.mean_delta[..len].copy_from_slice(&self.mean[(self.delay + 1) * n_y..][..len]);
+                target
+            }
+            true => {
+                self.mean_delta[..len].copy_from_slice(&self.slopes.rho[n_y..][..len]);
+                let mean = &self.mean[(self.delay + 1) * n_y..][..len];
+                let own = target.iter().zip(mean).zip(&self.slopes.rho[n_y..]).enumerate();
+                for (at, (out, (k, ((target, y), rho)))) in self.slopes.target.iter_mut().zip(own).enumerate() {
+                    debug_assert_eq!(at, k);
+                    *out = rho + (target - y) / self.features.scale(k % n_y);
+                }
+                &self.slopes.target[..len]
+            }
+        };
         let variance: &mut [f64] = match self.variance_delta.is_empty() {
             true => &mut [],
             false => {
-                self.variance_delta[..len].copy_from_slice(&self.variance[n_x..][..len]);
+                self.variance_delta[..len].copy_from_slice(&self.variance[n_y..][..len]);
                 &mut self.variance_delta[..len]
             }
         };
-        // The target of row r's step is xi samples after its input.
-        let target = &self.samples[self.delay * n_x..][..len];
         Predictions {
             mean: &mut self.mean_delta[..len],
             variance,
@@ -380,11 +434,34 @@ impl ErrorRegression {
             terms: &mut self.terms,
             squares: &mut self.squares,
             precisions: &mut self.precisions,
+            linear: skip || self.packed.linear_mean,
         }
-        .score(simd, self.floor);
+        .score(simd, self.packed.floor);
+        let is_missing = |k: usize| self.samples[self.delay * n_y + k].is_nan();
+        if (0..len).any(is_missing) {
+            for k in (0..len).filter(|k| is_missing(*k)) {
+                (self.mean_delta[k], self.terms[k], self.squares[k]) = (0.0, 0.0, 0.0);
+                if let Some(delta) = self.variance_delta.get_mut(k) {
+                    *delta = 0.0;
+                }
+            }
+        }
+        if skip {
+            for k in (0..len).filter(|k| !is_missing(*k)) {
+                let s = self.features.scale(k % n_y);
+                self.squares[k] *= s * s;
+                self.terms[k] = match self.variance_delta.is_empty() {
+                    false => self.terms[k] - s.ln(),
+                    true => -0.5 * self.squares[k],
+                };
+                if self.variance_delta.is_empty() {
+                    self.mean_delta[k] *= s * s;
+                }
+            }
+        }
         if self.options.mask.iter().any(|share| *share != 1.0) {
             let lists = [&mut self.mean_delta, &mut self.variance_delta, &mut self.terms, &mut self.squares];
-            for row in lists.into_iter().flat_map(|list| list.chunks_exact_mut(n_x).take(self.length)) {
+            for row in lists.into_iter().flat_map(|list| list.chunks_exact_mut(n_y).take(self.length)) {
                 row.iter_mut().zip(&self.options.mask).for_each(|(value, share)| *value *= share);
             }
         }
@@ -394,8 +471,11 @@ impl ErrorRegression {
     /// d ln L_reg / du of the window's tail, left in the first delta row (2.22).
     #[inline(always)]
     fn run_back<S: Simd>(&mut self, simd: S) {
+        if !self.features.are_plain() {
+            return self.run_back_with_features(simd);
+        }
         let packed = &self.packed;
-        let (n_x, n_c, stride) = (packed.n_x, packed.n_c, packed.delta_stride);
+        let (n_x, n_c, stride) = (packed.n_y, packed.n_c, packed.delta_stride);
         self.deltas[self.length * stride..][..n_c].fill(0.0);
         for row in (0..=self.length).rev() {
             let outputs = &mut self.deltas[row * stride + n_c..][..packed.n_out];
@@ -423,15 +503,17 @@ impl ErrorRegression {
             // The row's input was predicted xi steps before, perhaps in the window.
             if row > self.delay {
                 let du = &before[(row - 1) * stride..][..stride];
-                let (matrices, sources) = ([&self.to_input], [Columns { values: du, stride }]);
+                let (matrices, sources) = ([&packed.to_input], [Columns { values: du, stride }]);
                 let product = Product { matrices, sources, columns: 1, start: &packed.zeros, ahead: &[] };
                 multiply(simd, product, &mut self.outputs);
                 let made = row - self.delay;
                 let y = &self.mean[(self.delay + made) * n_x..][..n_x];
                 let delta = &mut self.mean_delta[(made - 1) * n_x..][..n_x];
                 for i in 0..n_x {
-                    let share = 1.0 - self.options.sensed_in_window[i];
-                    delta[i] += (1.0 - y[i] * y[i]) * share * self.outputs[i];
+                    let missing = self.samples[(row - 1) * n_x + i].is_nan();
+                    let share = if missing { 1.0 } else { 1.0 - self.options.sensed_in_window[i] };
+                    let slope = if packed.linear_mean { 1.0 } else { 1.0 - y[i] * y[i] };
+                    delta[i] += slope * share * self.outputs[i];
                 }
             }
         }
@@ -498,12 +580,13 @@ impl WithSimd for Predict<'_> {
             regression.arrive(simd, row);
         }
         regression.leave(simd, first + regression.options.ahead + 1);
-        let n_x = regression.packed.n_x;
+        let n_y = regression.packed.n_y;
         if !regression.next_variance.is_empty() {
             let len = regression.next_variance.len();
-            regression.next_variance.copy_from_slice(&regression.variance[first * n_x..][..len]);
+            regression.next_variance.copy_from_slice(&regression.variance[first * n_y..][..len]);
             exp_slice(simd, 1.0, &mut regression.next_variance);
-            regression.next_variance.iter_mut().for_each(|v| *v += regression.floor);
+            let features = &regression.features;
+            regression.next_variance.iter_mut().enumerate().for_each(|(k, v)| *v = features.variance(k % n_y, *v));
         }
     }
 }

@@ -270,7 +270,7 @@ fn senseless_requests_are_refused_and_leave_no_trace() {
     let mut regression = ErrorRegression::new(&network, &u0(&network), options, &Engine::new(1, set).unwrap()).unwrap();
     observe_all(&mut regression, 4);
     let before = regression.mean().to_vec();
-    assert!(regression.observe(&[0.0, f64::NAN, 0.0], &mut || true).unwrap_err().to_string().contains("is NaN"));
+    assert!(regression.observe(&[0.0, f64::INFINITY, 0.0], &mut || true).unwrap_err().to_string().contains("is inf"));
     assert!(regression.observe(&[0.0], &mut || true).is_err());
     assert_eq!((regression.mean(), regression.window()), (&before[..], 3));
 }
@@ -309,5 +309,116 @@ fn what_is_forecast_is_what_generation_gives_once_samples_run_out() {
             assert!(close(regression.forecast_context(steps), &own(&generated.contexts, 13)));
         }
         assert_eq!(regression.forecast_mean(0), regression.mean());
+    }
+}
+
+/// Samples of which some values are missing, the first one's among them.
+fn gapped(t: usize) -> [f64; 3] {
+    let mut x = sample(t);
+    if t % 3 == 0 {
+        x[t % 2] = f64::NAN;
+    }
+    if t % 7 == 5 {
+        x = [f64::NAN; 3];
+    }
+    x
+}
+
+/// The same network with features, one kind after the other.
+fn with_features(delay: usize, variance: bool) -> Vec<Network> {
+    use crate::features::{Skip, SkipKind, velocity_deviations};
+    let data = crate::dataset::Sequence::new("s", 3, (0..40).flat_map(sample).collect()).unwrap();
+    let data = crate::dataset::Dataset::new(crate::dataset::Dataset::numbered_channels(3), vec![data]).unwrap();
+    let bare = network(delay, variance, fast_and_slow()).topology;
+    let skip = |kind| Skip::fit(kind, &data, delay).unwrap();
+    let topologies = [
+        bare.clone(),
+        bare.clone().with_linear_mean(true),
+        bare.clone().with_velocity_inputs(velocity_deviations(&data)).unwrap(),
+        bare.clone().with_skip(skip(SkipKind::Residual)).unwrap(),
+        bare.clone()
+            .with_linear_mean(true)
+            .with_velocity_inputs(velocity_deviations(&data))
+            .unwrap()
+            .with_skip(skip(SkipKind::Extrapolation { damping: 0.7 }))
+            .unwrap(),
+        bare.with_linear_mean(true).with_skip(skip(SkipKind::Autoregressive { lags: 3 })).unwrap(),
+    ];
+    let build = |topology: Topology| {
+        let (mut network, _) = initialize(&topology, 1, 11);
+        network.parameters.as_mut_slice().iter_mut().enumerate().for_each(|(k, w)| *w += 0.1 * (1.3 * k as f64).sin());
+        network
+    };
+    topologies.into_iter().map(build).collect()
+}
+
+#[test]
+fn features_and_missing_values_have_the_gradient_of_differences() {
+    for (delay, variance, count, shares) in
+        [(1, true, 30, [0.0; 3]), (1, false, 9, [0.3; 3]), (2, true, 30, [0.25, 0.0, 1.0]), (4, true, 40, [0.0; 3])]
+    {
+        for (kind, network) in with_features(delay, variance).iter().enumerate() {
+            let options = ErrorRegressionOptions {
+                window: 12,
+                iterations: 0,
+                sensed_in_window: shares.to_vec(),
+                ..ErrorRegressionOptions::new(3)
+            };
+            let mut regression = ErrorRegression::new(network, &u0(network), options, &Engine::serial()).unwrap();
+            for t in 0..count {
+                regression.observe(&gapped(t), &mut || true).unwrap();
+            }
+            let set = regression.set;
+            let (_, gradient) = set.run(Evaluate(&mut regression));
+            for (i, found) in gradient.iter().enumerate() {
+                let before = regression.internal[i];
+                let mut at = |offset: f64| {
+                    regression.internal[i] = before + offset;
+                    let value = set.run(Evaluate(&mut regression)).0;
+                    regression.internal[i] = before;
+                    value
+                };
+                let h = 1e-5;
+                let slope = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
+                let near = (found - slope).abs() < 1e-6 * (1.0 + slope.abs());
+                assert!(near, "delay {delay}, kind {kind}, unit {i}: {found} instead of {slope}");
+            }
+        }
+    }
+}
+
+#[test]
+fn with_features_and_missing_values_it_forecasts_what_generation_gives() {
+    for (delay, count) in [(1, 9), (3, 4), (4, 30)] {
+        for (kind, network) in with_features(delay, true).iter().enumerate() {
+            let (iterations, ahead) = (0, 8);
+            let options = ErrorRegressionOptions {
+                iterations,
+                ahead,
+                window: 6,
+                sensed: vec![1.0; 3],
+                sensed_in_window: vec![1.0; 3],
+                ..ErrorRegressionOptions::new(3)
+            };
+            let mut regression = ErrorRegression::new(network, &u0(network), options, &Engine::serial()).unwrap();
+            for t in 0..count {
+                regression.observe(&gapped(t), &mut || true).unwrap();
+            }
+            let sensed: Vec<f64> = (0..count).flat_map(gapped).collect();
+            let steps = count - delay + 1 + ahead;
+            let options = GenerationOptions { steps, feedback: Feedback::mixed(3, 1.0, false), seed: 1, contexts: false };
+            let start = Start { initial_state: &u0(network), sensed: &sensed };
+            let generated = generate(network, &[start], &options, &Engine::serial()).unwrap();
+            for step in 0..=ahead {
+                let row = count - delay + step;
+                for i in 0..3 {
+                    let (found, expected) = (regression.forecast_mean(step)[i], generated[0].mean[3 * row + i]);
+                    let name = format!("delay {delay}, kind {kind}, {step} ahead, channel {i}");
+                    assert!((found - expected).abs() < 1e-11, "{name}: {found} instead of {expected}");
+                    let (found, expected) = (regression.forecast_variance(step)[i], generated[0].variance[3 * row + i]);
+                    assert!((found / expected - 1.0).abs() < 1e-11, "{name}: variance {found} instead of {expected}");
+                }
+            }
+        }
     }
 }

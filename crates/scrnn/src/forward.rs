@@ -7,6 +7,8 @@
 //! v_i  = exp  (sum_j w_vc[i,j] c_j + b_i) + floor                                           (2.2), (2.5)
 //! ```
 //!
+//! With a skip connection y and v are what [`crate::features`] makes of them, and so is x of the samples.
+//!
 //! Letters: `x` input, `u` internal state, `c` context, `y` mean, `v` variance, `w_ab` weight to a from b.
 //!
 //! [`Plain`] is the reference: one sequence, one step at a time. The fast version runs all columns of a block.
@@ -15,6 +17,7 @@ use pulp::Simd;
 
 use crate::batch::Block;
 use crate::dataset::Sequence;
+use crate::features::{Features, Past};
 use crate::kernels::activation::tanh_rows;
 use crate::kernels::copy_few;
 use crate::kernels::panels::{Columns, Product, multiply};
@@ -27,6 +30,10 @@ use crate::trajectory::Trajectory;
 #[derive(Debug, Clone)]
 pub struct Plain<'a> {
     network: &'a Network,
+    features: Features,
+    past: Past,
+    /// The means of the last xi steps, oldest first.
+    means: Vec<Vec<f64>>,
     tau: Vec<f64>,
     /// Internal state u, N_C values.
     pub u: Vec<f64>,
@@ -47,8 +54,12 @@ impl<'a> Plain<'a> {
     pub fn new(network: &'a Network, u0: &[f64]) -> Self {
         let topology = &network.topology;
         assert_eq!(u0.len(), topology.context_units(), "one initial value for each context unit");
+        let features = Features::new(topology);
         Self {
             network,
+            past: Past::new(&features),
+            features,
+            means: Vec::new(),
             tau: topology.time_constants(),
             u: u0.to_vec(),
             c: u0.iter().map(|u| u.tanh()).collect(),
@@ -57,8 +68,19 @@ impl<'a> Plain<'a> {
         }
     }
 
-    /// Advances one step with input `x`, N_I values.
+    /// Advances one step with the sample `x`, N_O values; NaN is missing.
     pub fn step(&mut self, x: &[f64]) {
+        let topology = &self.network.topology;
+        let due = (self.means.len() == topology.delay()).then(|| self.means.remove(0));
+        let last = self.past.at(0).to_vec();
+        let stand_in = |i: usize| due.as_ref().map_or(last[i], |due| due[i]);
+        let x: Vec<f64> = x.iter().enumerate().map(|(i, x)| if x.is_nan() { stand_in(i) } else { *x }).collect();
+        self.past.push(&x);
+        let mut x = vec![0.0; topology.inputs()];
+        self.features.inputs(|back| self.past.at(back), &mut x);
+        let mut guess = vec![0.0; topology.channels()];
+        self.features.guess(|back| self.past.at(back), &mut guess);
+
         let parameters = &self.network.parameters;
         let affine = |weights: Parameter, bias: Parameter, from: &[f64], i: usize| {
             let row = &parameters.block(weights)[i * from.len()..(i + 1) * from.len()];
@@ -67,7 +89,7 @@ impl<'a> Plain<'a> {
         let drive: Vec<f64> = (0..self.u.len())
             .map(|i| {
                 let row = &parameters.block(Parameter::ContextFromInput)[i * x.len()..(i + 1) * x.len()];
-                let input: f64 = row.iter().zip(x).map(|(w, x)| w * x).sum();
+                let input: f64 = row.iter().zip(&x).map(|(w, x)| w * x).sum();
                 input + affine(Parameter::ContextFromContext, Parameter::ContextBias, &self.c, i)
             })
             .collect();
@@ -76,12 +98,14 @@ impl<'a> Plain<'a> {
             self.c[i] = self.u[i].tanh();
         }
         for (i, y) in self.y.iter_mut().enumerate() {
-            *y = affine(Parameter::MeanFromContext, Parameter::MeanBias, &self.c, i).tanh();
+            let u = affine(Parameter::MeanFromContext, Parameter::MeanBias, &self.c, i);
+            *y = self.features.mean(i, guess[i], if topology.has_linear_mean() { u } else { u.tanh() });
         }
-        let floor = self.network.topology.variance_floor();
         for (i, v) in self.v.iter_mut().enumerate() {
-            *v = affine(Parameter::VarianceFromContext, Parameter::VarianceBias, &self.c, i).exp() + floor;
+            let u = affine(Parameter::VarianceFromContext, Parameter::VarianceBias, &self.c, i);
+            *v = self.features.variance(i, u.exp());
         }
+        self.means.push(self.y.clone());
     }
 }
 
@@ -158,8 +182,8 @@ pub(crate) fn run<S: Simd>(
     trajectory: &mut Trajectory,
 ) {
     let (n, stride, rows) = (block.columns(), packed.state_stride, packed.rows);
-    let (n_x, n_c) = (packed.n_x, packed.n_c);
-    let variance = packed.n_out > n_x;
+    let (n_y, n_c) = (packed.n_y, packed.n_c);
+    let variance = packed.n_out > n_y;
     for k in range {
         let active = block.active(k);
         let at = (k - span_start) * n * stride;
@@ -174,13 +198,16 @@ pub(crate) fn run<S: Simd>(
         );
         advance(simd, packed, &trajectory.drive, internal, next, active);
         if record && k > 0 {
-            let out = (k - 1) * n * n_x;
+            let out = (k - 1) * n * n_y;
             for column in 0..active {
-                let y = &next[column * stride + n_c..][..n_x];
-                copy_few(&mut trajectory.mean[out + column * n_x..][..n_x], y);
+                let y = match packed.linear_mean {
+                    false => &next[column * stride + n_c..][..n_y],
+                    true => &internal[column * rows + n_c..][..n_y],
+                };
+                copy_few(&mut trajectory.mean[out + column * n_y..][..n_y], y);
                 if variance {
-                    let u = &internal[column * rows + n_c + n_x..][..n_x];
-                    copy_few(&mut trajectory.variance[out + column * n_x..][..n_x], u);
+                    let u = &internal[column * rows + n_c + n_y..][..n_y];
+                    copy_few(&mut trajectory.variance[out + column * n_y..][..n_y], u);
                 }
             }
         }

@@ -6,7 +6,8 @@
 //! ```
 //!
 //! Each channel has its own rule, and a mixing ratio between the two. The first xi inputs of a closed loop are sensed
-//! samples where there are any, else 0; once sensed samples run out, the predictions are fed back.
+//! samples where there are any, else 0; once sensed samples run out, the predictions are fed back. A sensed value that is missing
+//! (NaN) is stood in for by the mean that was predicted for it, and where nothing was, by the channel's last input, or 0.
 
 use pulp::{Simd, WithSimd};
 use rand::rngs::ChaCha8Rng;
@@ -14,6 +15,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::engine::{Engine, Run};
 use crate::error::{Error, Result};
+use crate::features::{Features, Past};
 use crate::network::Network;
 use crate::packed::Packed;
 use crate::stepper::Stepper;
@@ -61,7 +63,8 @@ impl Feedback {
 pub struct Start<'a> {
     /// u_0, N_C values.
     pub initial_state: &'a [f64],
-    /// Sensed samples x channels, row-major, in the network's units; may be empty. Sample k is the input of step k.
+    /// Sensed samples x channels, row-major, in the network's units; may be empty. Sample k is the input of step k; NaN is a missing
+    /// value.
     pub sensed: &'a [f64],
 }
 
@@ -149,10 +152,10 @@ pub fn generate(
         .enumerate()
         .map(|(index, starts)| Job { starts, first: index * COLUMNS, out: Vec::new() })
         .collect();
-    let (delay, floor, variance) = (topology.delay(), topology.variance_floor(), topology.has_variance());
+    let (delay, features, variance) = (topology.delay(), Features::new(topology), topology.has_variance());
     engine.for_each(&mut jobs, |job| {
-        let (packed, starts, first) = (&packed, job.starts, job.first);
-        job.out = engine.instruction_set().run(Generate { packed, delay, floor, variance, options, starts, first });
+        let (packed, features, starts, first) = (&packed, &features, job.starts, job.first);
+        job.out = engine.instruction_set().run(Generate { packed, features, delay, variance, options, starts, first });
     });
     Ok(jobs.into_iter().flat_map(|job| job.out).collect())
 }
@@ -180,8 +183,8 @@ struct Job<'a> {
 
 struct Generate<'a> {
     packed: &'a Packed,
+    features: &'a Features,
     delay: usize,
-    floor: f64,
     variance: bool,
     options: &'a GenerationOptions,
     starts: &'a [Start<'a>],
@@ -193,34 +196,40 @@ impl WithSimd for Generate<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Vec<Generated> {
-        let Self { packed, delay, floor, variance, options, starts, first } = self;
-        let (n_x, columns) = (packed.n_x, starts.len());
+        let Self { packed, features, delay, variance, options, starts, first } = self;
+        let (n_y, columns) = (packed.n_y, starts.len());
         let mut stepper = Stepper::new(packed, columns);
         let mut out = vec![Generated::default(); columns];
         let mut random = Vec::with_capacity(columns);
         for (column, start) in starts.iter().enumerate() {
             stepper.start(packed, column, start.initial_state);
             random.push(stream(options.seed, Purpose::Generation, (first + column) as u64));
-            out[column].mean.reserve_exact(options.steps * n_x);
-            out[column].sample.reserve_exact(options.steps * n_x);
+            out[column].mean.reserve_exact(options.steps * n_y);
+            out[column].sample.reserve_exact(options.steps * n_y);
         }
+        let mut past = vec![Past::new(features); columns];
+        let (mut x, mut guess) = (vec![0.0; n_y], vec![0.0; n_y]);
         stepper.enter(simd, packed);
         for k in 0..options.steps {
             for (column, start) in starts.iter().enumerate() {
-                let input = stepper.input(packed, column);
-                let sensed = start.sensed.get(k * n_x..(k + 1) * n_x);
-                let predicted = k.checked_sub(delay).map(|from| &out[column].sample[from * n_x..(from + 1) * n_x]);
-                self::input(input, &options.feedback, sensed, predicted);
+                let sensed = start.sensed.get(k * n_y..(k + 1) * n_y);
+                let from = k.checked_sub(delay).map(|from| from * n_y..(from + 1) * n_y);
+                let predicted = from.map(|from| (&out[column].sample[from.clone()], &out[column].mean[from]));
+                x.copy_from_slice(past[column].at(0));
+                self::input(&mut x, &options.feedback, sensed, predicted);
+                past[column].push(&x);
+                features.inputs(|back| past[column].at(back), stepper.input(packed, column));
             }
             stepper.step(simd, packed);
             for (column, out) in out.iter_mut().enumerate() {
-                let mean = stepper.mean(packed, column);
-                let precise = stepper.variance(packed, column);
-                for (i, (&y, rule)) in mean.iter().zip(&options.feedback.0).enumerate() {
+                let (rho, exp_u) = (stepper.mean(packed, column), stepper.variance(packed, column));
+                features.guess(|back| past[column].at(back), &mut guess);
+                for (i, (&rho, rule)) in rho.iter().zip(&options.feedback.0).enumerate() {
+                    let y = features.mean(i, guess[i], rho);
                     out.mean.push(y);
                     let mut sample = y;
                     if variance {
-                        let v = precise[i] + floor;
+                        let v = features.variance(i, exp_u[i]);
                         out.variance.push(v);
                         sample = draw(&mut random[column], y, v, rule.noise);
                     }
@@ -235,15 +244,18 @@ impl WithSimd for Generate<'_> {
     }
 }
 
-/// Fills the input from what is sensed and what was predicted for it (2.25a), (2.25b); 0 without either.
+/// Fills the input from what is sensed and what was predicted for it, a sample and its mean (2.25a), (2.25b). Without either it stays
+/// what it was.
 #[inline(always)]
-fn input(input: &mut [f64], feedback: &Feedback, sensed: Option<&[f64]>, predicted: Option<&[f64]>) {
+fn input(input: &mut [f64], feedback: &Feedback, sensed: Option<&[f64]>, predicted: Option<(&[f64], &[f64])>) {
     for (i, (x, rule)) in input.iter_mut().zip(&feedback.0).enumerate() {
+        let sensed = sensed.map(|sensed| sensed[i]);
         *x = match (sensed, predicted) {
-            (Some(sensed), None) => sensed[i],
-            (Some(sensed), Some(predicted)) => mix(rule.sensed, sensed[i], predicted[i]),
-            (None, Some(predicted)) => predicted[i],
-            (None, None) => 0.0,
+            (Some(sensed), None) if !sensed.is_nan() => sensed,
+            (Some(sensed), Some((sample, mean))) if sensed.is_nan() => mix(rule.sensed, mean[i], sample[i]),
+            (Some(sensed), Some((sample, _))) => mix(rule.sensed, sensed, sample[i]),
+            (None, Some((sample, _))) => sample[i],
+            (_, None) => *x,
         };
     }
 }

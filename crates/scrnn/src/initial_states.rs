@@ -93,7 +93,16 @@ impl InitialStates {
         &mut self.mean
     }
 
-    /// ln L_init of (2.16) in nats, constant included.
+    /// Sets all learned states to their mean, as where the prior has no variance.
+    pub fn share(&mut self, topology: &Topology) {
+        let learns: Vec<bool> = topology.per_unit(|group| group.learns_initial_state).collect();
+        for u0 in self.values.chunks_exact_mut(self.units) {
+            let own = u0.iter_mut().zip(&self.mean).zip(&learns);
+            own.filter(|(_, learns)| **learns).for_each(|((u0, mean), _)| *u0 = *mean);
+        }
+    }
+
+    /// ln L_init of (2.16) in nats, constant included; 0 where the variance is 0 and all states are their mean.
     #[must_use]
     pub fn ln_prior(&self, topology: &Topology, variance: f64) -> f64 {
         let states = self.values.chunks_exact(self.units);
@@ -123,6 +132,9 @@ impl InitialStates {
 
 /// Adds ln L_init of one sequence (2.16) to `sum`, unit after unit.
 pub(crate) fn add_ln_prior(mut sum: f64, topology: &Topology, variance: f64, u0: &[f64], mean: &[f64]) -> f64 {
+    if variance == 0.0 {
+        return sum;
+    }
     let constant = -0.5 * (2.0 * std::f64::consts::PI * variance).ln();
     let learned = topology.per_unit(|group| group.learns_initial_state);
     for ((&u0, &mean), learned) in u0.iter().zip(mean).zip(learned) {

@@ -16,7 +16,7 @@ use crate::topology::Topology;
 pub fn initialize(topology: &Topology, sequences: usize, seed: u64) -> (Network, InitialStates) {
     let mut random = stream(seed, Purpose::InitialWeights, 0);
     let mut uniform = |bound: f64| bound * (2.0 * random.random::<f64>() - 1.0);
-    let (n_x, n_c) = (topology.channels(), topology.context_units());
+    let (n_x, n_c) = (topology.inputs(), topology.context_units());
     let from_input = 1.0 / n_x as f64;
     let from_context = 1.0 / n_c as f64;
 

@@ -81,6 +81,7 @@
 //! | module | what it holds | thesis |
 //! |---|---|---|
 //! | [`topology`], [`parameters`], [`network`] | groups of context units, weights and biases, both together | 2.5, 2.10 |
+//! | [`features`] | what is shown of samples, and what outputs are added to: velocity inputs, skip connection | |
 //! | [`initial_states`], [`initialization`] | u_0 of each sequence and their mean; random starting values | 2.6.1, 2.7 |
 //! | [`dataset`], [`scaling`] | sequences, and their way into the network's range | 2.6.1, 4.2 |
 //! | [`kernels`], [`engine`] | products, tanh and exp in SIMD; instruction set and threads | |
@@ -123,6 +124,7 @@ pub mod engine;
 pub mod error;
 pub mod error_regression;
 pub mod evaluation;
+pub mod features;
 pub mod forward;
 pub mod generation;
 pub mod initial_states;
@@ -146,6 +148,7 @@ pub use dataset::{Dataset, Sequence};
 pub use engine::{Engine, InstructionSet};
 pub use error::{Error, Result};
 pub use error_regression::{ErrorRegression, ErrorRegressionOptions};
+pub use features::{Skip, SkipKind};
 pub use generation::{Feedback, Generated, GenerationOptions, Start, generate};
 pub use initial_states::InitialStates;
 pub use initialization::initialize;

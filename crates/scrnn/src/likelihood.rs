@@ -25,7 +25,7 @@ pub fn ln_gaussian(target: f64, y: f64, v: f64) -> f64 {
 }
 
 /// ln L_out of one sequence (-E without variance) and its sum of squared errors, in plain loops: the reference.
-/// `samples` is row-major; the first `steps` + xi are used.
+/// `samples` is row-major; the first `steps` + xi are used, and NaN does not count.
 #[must_use]
 pub fn plain(network: &Network, u0: &[f64], samples: &[f64], steps: usize) -> (f64, f64) {
     let (n_x, delay) = (network.topology.channels(), network.topology.delay());
@@ -33,7 +33,7 @@ pub fn plain(network: &Network, u0: &[f64], samples: &[f64], steps: usize) -> (f
     let (mut ln_likelihood, mut squared_error) = (0.0, 0.0);
     for k in 0..steps {
         state.step(&samples[k * n_x..(k + 1) * n_x]);
-        for (i, target) in samples[(k + delay) * n_x..][..n_x].iter().enumerate() {
+        for (i, target) in samples[(k + delay) * n_x..][..n_x].iter().enumerate().filter(|(_, target)| !target.is_nan()) {
             let squared = (target - state.y[i]).powi(2);
             squared_error += squared;
             ln_likelihood += match state.v.get(i) {
@@ -58,22 +58,26 @@ pub(crate) struct Predictions<'a> {
     pub squares: &'a mut [f64],
     /// Scratch.
     pub precisions: &'a mut [f64],
+    /// Whether the mean units are linear.
+    pub linear: bool,
 }
 
 impl Predictions<'_> {
     /// Scores all predictions. All lists have the same length.
     #[inline(always)]
     pub fn score<S: Simd>(self, simd: S, floor: f64) {
-        let Self { mean, variance, target, terms, squares, precisions } = self;
+        let Self { mean, variance, target, terms, squares, precisions, linear } = self;
         let n = target.len();
         let (mean, terms, squares) = (&mut mean[..n], &mut terms[..n], &mut squares[..n]);
+        // d mean / d u of the mean unit.
+        let slope = |y: f64| if linear { 1.0 } else { 1.0 - y * y };
         if variance.is_empty() {
             for k in 0..n {
                 let y = mean[k];
                 let e = target[k] - y;
                 squares[k] = e * e;
                 terms[k] = -0.5 * (e * e);
-                mean[k] = (1.0 - y * y) * e;
+                mean[k] = slope(y) * e;
             }
             return;
         }
@@ -87,7 +91,7 @@ impl Predictions<'_> {
                 let weighted = e * e * precisions[k];
                 squares[k] = e * e;
                 terms[k] = -0.5 * (LN_2PI + variance[k] + weighted);
-                mean[k] = (1.0 - y * y) * e * precisions[k];
+                mean[k] = slope(y) * e * precisions[k];
                 variance[k] = 0.5 * (weighted - 1.0);
             }
         } else {
@@ -103,7 +107,7 @@ impl Predictions<'_> {
                 let weighted = e * e / v;
                 squares[k] = e * e;
                 terms[k] = -0.5 * (LN_2PI + terms[k] + weighted);
-                mean[k] = (1.0 - y * y) * e / v;
+                mean[k] = slope(y) * e / v;
                 variance[k] = 0.5 * (weighted - 1.0) * (variance[k] / v);
             }
         }

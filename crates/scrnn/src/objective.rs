@@ -17,6 +17,7 @@ use crate::error::Result;
 use crate::parameters::{Gradients, Parameters};
 use crate::topology::Topology;
 
+mod closed;
 mod cpu;
 
 /// Makes objectives.
@@ -38,13 +39,59 @@ pub struct Request<'a> {
     pub data: &'a Dataset,
     /// Trade a second forward pass for memory that grows with the square root of the length, where the backend can.
     pub recompute: bool,
+    /// How runs that go on in a closed loop count. A backend that cannot run them must refuse.
+    pub closed_loop: Option<ClosedLoopTerm>,
+}
+
+/// The likelihood of closed loops: what the network predicts of a sequence when it runs on what it predicted itself.
+///
+/// ```text
+/// x_t = y_t + sqrt(v_t) e_t   from some step on, in K copies that differ in e alone
+/// M = mean_k y_k,   V = mean_k v_k + sum_k (y_k - M)^2 / (K - 1)
+/// weight * ln N(y-hat | M, V)   in place of ln N(y-hat | y, v)
+/// ```
+///
+/// The gradient runs through the copies' own inputs, their noise included.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct ClosedLoopTerm {
+    /// K.
+    pub copies: usize,
+    /// What a step in the closed loop counts; a taught one counts 1.
+    pub weight: f64,
+}
+
+impl ClosedLoopTerm {
+    /// So many copies, at this weight.
+    #[must_use]
+    pub fn new(copies: usize, weight: f64) -> Self {
+        Self { copies, weight }
+    }
+}
+
+/// Where a run leaves the samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Release {
+    /// The first step whose input is the network's own, counted from 0 and at least xi.
+    pub step: usize,
+    /// Seed of the noise.
+    pub seed: u64,
+}
+
+impl Release {
+    /// From this step on, with noise of this seed.
+    #[must_use]
+    pub fn new(step: usize, seed: u64) -> Self {
+        Self { step, seed }
+    }
 }
 
 impl<'a> Request<'a> {
     /// Without recomputation.
     #[must_use]
     pub fn new(topology: &'a Topology, data: &'a Dataset) -> Self {
-        Self { topology, data, recompute: false }
+        Self { topology, data, recompute: false, closed_loop: None }
     }
 }
 
@@ -56,13 +103,22 @@ pub struct Run {
     pub sequence: usize,
     /// Steps T, at least 1: the first T + xi samples count.
     pub steps: usize,
+    /// Where it goes on in a closed loop; none is teacher forcing throughout.
+    pub release: Option<Release>,
 }
 
 impl Run {
     /// The first `steps` steps of a sequence.
     #[must_use]
     pub fn new(sequence: usize, steps: usize) -> Self {
-        Self { sequence, steps }
+        Self { sequence, steps, release: None }
+    }
+
+    /// The same, going on in a closed loop.
+    #[must_use]
+    pub fn released(mut self, release: Release) -> Self {
+        self.release = Some(release);
+        self
     }
 
     /// One run through the whole of each sequence.
@@ -71,6 +127,7 @@ impl Run {
         let whole = |(sequence, values): (usize, &crate::dataset::Sequence)| Self {
             sequence,
             steps: values.len().saturating_sub(delay),
+            release: None,
         };
         data.sequences().iter().enumerate().map(whole).collect()
     }

@@ -23,8 +23,10 @@ use crate::topology::Topology;
 pub(crate) struct Packed {
     /// N_C.
     pub n_c: usize,
-    /// N_I = N_O.
+    /// N_I.
     pub n_x: usize,
+    /// N_O.
+    pub n_y: usize,
     /// xi.
     pub delay: usize,
     /// Mean and variance units together.
@@ -49,6 +51,12 @@ pub(crate) struct Packed {
     /// The input does not reach the outputs: zeros, so that both products have one form.
     pub outputs_from_input: Panels,
     pub output_bias: AVec<f64>,
+    /// Back from the context to the input. Rows: inputs.
+    pub to_input: Panels,
+    /// The variance floor.
+    pub floor: f64,
+    /// Whether the mean units are linear.
+    pub linear_mean: bool,
     /// Start of sums that start from nothing.
     pub zeros: AVec<f64>,
     receives: Vec<bool>,
@@ -61,7 +69,7 @@ fn filled(count: usize, value: f64) -> AVec<f64> {
 
 impl Packed {
     pub fn new(topology: &Topology, set: InstructionSet) -> Self {
-        let (n_c, n_x, n_out) = (topology.context_units(), topology.channels(), topology.output_units());
+        let (n_c, n_x, n_out) = (topology.context_units(), topology.inputs(), topology.output_units());
         let rows = padded(n_c + n_out);
         let mut decay = filled(rows, 0.0);
         let mut rate = filled(rows, 1.0);
@@ -73,6 +81,7 @@ impl Packed {
         Self {
             n_c,
             n_x,
+            n_y: topology.channels(),
             delay: topology.delay(),
             n_out,
             rows,
@@ -87,7 +96,10 @@ impl Packed {
             outputs: panels(n_out, n_c),
             outputs_from_input: panels(n_out, n_x),
             output_bias: filled(padded(n_out), 0.0),
-            zeros: filled(rows, 0.0),
+            to_input: panels(n_x, n_c),
+            floor: topology.variance_floor(),
+            linear_mean: topology.has_linear_mean(),
+            zeros: filled(rows.max(padded(n_x)), 0.0),
             receives: topology.per_unit(|group| group.receives_input).collect(),
             drives: topology.per_unit(|group| group.drives_output).collect(),
         }
@@ -110,6 +122,7 @@ impl Packed {
             Some(o) => output(o, row),
         });
         self.outputs.fill(self.n_out, output);
+        self.to_input.fill(n_x, |i, k| rate[k] * w_cx[k * n_x + i]);
         for (i, b) in b_c.iter().enumerate() {
             self.bias[i] = self.rate[i] * b;
         }

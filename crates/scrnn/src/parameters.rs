@@ -64,7 +64,7 @@ impl Block {
         let (n_c, n_o) = (topology.context_units(), topology.channels());
         let n_v = if topology.has_variance() { n_o } else { 0 };
         match self {
-            Self::ContextFromInput => (n_c, n_o),
+            Self::ContextFromInput => (n_c, topology.inputs()),
             Self::ContextFromContext => (n_c, n_c),
             Self::ContextBias => (n_c, 1),
             Self::MeanFromContext => (n_o, n_c),

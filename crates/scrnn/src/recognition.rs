@@ -187,6 +187,17 @@ pub fn recognize(
     backend: &dyn Backend,
 ) -> Result<Vec<Recognition>> {
     check(network, learned, data, options)?;
+    if options.initial_state_variance == 0.0 && options.warm_starts != [WarmStart::Mean] {
+        // All sequences share one initial state: there is nothing to look for.
+        let options = RecognitionOptions {
+            starts: 1,
+            epochs: 0,
+            polish: 0,
+            warm_starts: vec![WarmStart::Mean],
+            ..options.clone()
+        };
+        return recognize(network, learned, data, &options, backend);
+    }
     let learns = network.topology.per_unit(|group| group.learns_initial_state).collect();
     let problem = Problem { network, data, options, mean: learned.mean(), learns };
     let mut objective = backend.objective(&Request::new(&network.topology, data))?;
@@ -240,7 +251,11 @@ fn check(network: &Network, learned: &InitialStates, data: &Dataset, options: &R
         return setting("beta2", options.beta2.to_string(), "a number from 0 to below 1");
     }
     let spread = ("random_spread", options.random_spread);
-    for (what, value) in [("rate", options.rate), ("initial_state_variance", options.initial_state_variance), spread] {
+    let variance = options.initial_state_variance;
+    if !(variance >= 0.0 && variance.is_finite()) {
+        return setting("initial_state_variance", variance.to_string(), "0 or a positive number");
+    }
+    for (what, value) in [("rate", options.rate), spread] {
         if !(value > 0.0 && value.is_finite()) {
             return setting(what, value.to_string(), "a positive number");
         }
@@ -283,9 +298,9 @@ impl Problem<'_> {
         self.options.observed.map_or(length, |observed| observed.min(length)) - self.network.topology.delay()
     }
 
-    /// Steps times channels: what a value per step and channel is divided by.
+    /// Steps times channels, less what is missing: what a value per step and channel is divided by.
     fn terms(&self, s: usize) -> f64 {
-        (self.steps(s) * self.network.topology.channels()) as f64
+        self.data.sequences()[s].targets(self.network.topology.delay(), self.steps(s)).max(1) as f64
     }
 
     /// How many columns may run at once. The same for any number of threads, though no bit depends on it.
@@ -315,6 +330,9 @@ impl Problem<'_> {
 
     /// d ln L_all / dz of unit `i`, where `gradient` is d ln L_out / d u_0.
     fn slope(&self, i: usize, gradient: f64, u0: f64) -> f64 {
+        if self.options.initial_state_variance == 0.0 {
+            return 0.0;
+        }
         let pull = (u0 - self.mean[i]) / self.options.initial_state_variance;
         self.scale() * (gradient - pull)
     }

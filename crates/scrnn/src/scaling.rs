@@ -65,7 +65,7 @@ impl Scaling {
         Self { offset, scale }
     }
 
-    /// Maps each channel's smallest and largest sample onto `onto`.
+    /// Maps each channel's smallest and largest sample onto `onto`. A channel without any is left as it is.
     #[must_use]
     pub fn fit(data: &Dataset, onto: (f64, f64)) -> Self {
         let n = data.channels().len();
@@ -74,6 +74,9 @@ impl Scaling {
             for (range, &x) in ranges.iter_mut().zip(sample) {
                 *range = (range.0.min(x), range.1.max(x));
             }
+        }
+        for range in ranges.iter_mut().filter(|(low, high)| low > high) {
+            *range = (f64::midpoint(onto.0, onto.1), f64::midpoint(onto.0, onto.1));
         }
         Self::from_ranges(&ranges, onto)
     }

@@ -66,14 +66,15 @@ impl Stepper {
         &self.states[column * packed.state_stride..][..packed.n_c]
     }
 
-    /// The predicted mean of a column, N_O values.
+    /// What the mean units of a column say, N_O values: y, where there is no skip connection.
     pub fn mean(&self, packed: &Packed, column: usize) -> &[f64] {
-        &self.mean[column * padded(packed.n_out)..][..packed.n_x]
+        let outputs = if packed.linear_mean { &self.outputs } else { &self.mean };
+        &outputs[column * padded(packed.n_out)..][..packed.n_y]
     }
 
     /// exp u of the variance units of a column; empty without them. The floor is not in it.
     pub fn variance(&self, packed: &Packed, column: usize) -> &[f64] {
-        &self.variance[column * padded(packed.n_out)..][packed.n_x..packed.n_out]
+        &self.variance[column * padded(packed.n_out)..][packed.n_y..packed.n_out]
     }
 
     /// Takes the inputs in, and predicts.

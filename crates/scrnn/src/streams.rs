@@ -56,6 +56,10 @@ pub enum Purpose {
     StudyLoops = 17,
     /// A seed for the trials of a study; index: the condition.
     StudyTrials = 18,
+    /// Where a training's closed loops begin, and seeds of their noise; index: the epoch.
+    ClosedLoopStarts = 19,
+    /// The noise of a training's closed loops; index: the copy.
+    ClosedLoopNoise = 20,
 }
 
 /// The generator of `purpose`.

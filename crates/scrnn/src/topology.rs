@@ -5,6 +5,7 @@
 //! a group's rules say whether the input reaches it and whether it drives the outputs (2.27).
 
 use crate::error::{Error, Result};
+use crate::features::{Skip, positive};
 
 /// Context units that share a time constant and a place in the hierarchy.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,6 +80,9 @@ pub struct Topology {
     delay: usize,
     groups: Vec<Group>,
     prediction: Prediction,
+    linear_mean: bool,
+    velocity_inputs: Option<Vec<f64>>,
+    skip: Option<Skip>,
 }
 
 impl Topology {
@@ -118,7 +122,73 @@ impl Topology {
         {
             return refuse("variance floor".into(), floor.to_string(), "0 or a positive number");
         }
-        Ok(Self { channels, delay, groups, prediction })
+        Ok(Self { channels, delay, groups, prediction, linear_mean: false, velocity_inputs: None, skip: None })
+    }
+
+    /// The same with mean units that are linear, instead of tanh (2.4). Predictions then have no bounds.
+    #[must_use]
+    pub fn with_linear_mean(mut self, linear: bool) -> Self {
+        self.linear_mean = linear;
+        self
+    }
+
+    /// The same with velocity inputs: beside each sample its difference to the one before, divided by `deviations`, one for each
+    /// channel ([`crate::features::velocity_deviations`]).
+    ///
+    /// # Errors
+    /// [`Error::Length`] for another number of channels, [`Error::Setting`] for a deviation that is not above 0.
+    pub fn with_velocity_inputs(mut self, deviations: Vec<f64>) -> Result<Self> {
+        self.fits("the list of velocities' deviations", deviations.len())?;
+        positive("a velocity's deviation", &deviations)?;
+        self.velocity_inputs = Some(deviations);
+        Ok(self)
+    }
+
+    /// The same with a skip connection from the samples to the mean.
+    ///
+    /// # Errors
+    /// [`Error::Length`] for another number of channels.
+    pub fn with_skip(mut self, skip: Skip) -> Result<Self> {
+        self.fits("the skip connection's list of scales", skip.scale().len())?;
+        self.skip = Some(skip);
+        Ok(self)
+    }
+
+    fn fits(&self, what: &str, found: usize) -> Result<()> {
+        match found == self.channels {
+            true => Ok(()),
+            false => Err(Error::Length { what: what.to_owned(), found, needed: self.channels }),
+        }
+    }
+
+    /// Whether the mean units are linear.
+    #[must_use]
+    pub fn has_linear_mean(&self) -> bool {
+        self.linear_mean
+    }
+
+    /// What velocity inputs are divided by, where there are some.
+    #[must_use]
+    pub fn velocity_inputs(&self) -> Option<&[f64]> {
+        self.velocity_inputs.as_deref()
+    }
+
+    /// The skip connection, where there is one.
+    #[must_use]
+    pub fn skip(&self) -> Option<&Skip> {
+        self.skip.as_ref()
+    }
+
+    /// Whether it has nothing that the thesis does not have: tanh means, samples as inputs, no skip connection.
+    #[must_use]
+    pub fn is_of_the_thesis(&self) -> bool {
+        !self.linear_mean && self.velocity_inputs.is_none() && self.skip.is_none()
+    }
+
+    /// Number of inputs, N_I: the channels, twice as many with velocity inputs.
+    #[must_use]
+    pub fn inputs(&self) -> usize {
+        self.channels * if self.velocity_inputs.is_some() { 2 } else { 1 }
     }
 
     /// An S-CTRNN without variance floor and with delay 1 (thesis 2.3).
@@ -130,7 +200,7 @@ impl Topology {
         Self::new(channels, 1, groups, Prediction::MeanAndVariance { floor: 0.0 })
     }
 
-    /// Channels of input and of output, N_I = N_O.
+    /// Channels of the samples and so of the output, N_O.
     #[must_use]
     pub fn channels(&self) -> usize {
         self.channels

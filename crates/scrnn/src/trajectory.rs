@@ -101,17 +101,17 @@ impl Trajectory {
                 list.resize(len, 0.0);
             }
         };
-        let channels = if packed.n_out > packed.n_x { packed.n_x } else { 0 };
+        let channels = if packed.n_out > packed.n_y { packed.n_y } else { 0 };
         // One more row than is read, for products that read shifted rows.
         grow(&mut self.states, ((cut.span + 1) * n + 1) * packed.state_stride);
         grow(&mut self.internal, n * packed.rows);
         grow(&mut self.drive, n * packed.rows);
         grow(&mut self.span_starts, cut.spans() * n * packed.rows);
-        grow(&mut self.mean, block.steps() * n * packed.n_x);
+        grow(&mut self.mean, block.steps() * n * packed.n_y);
         grow(&mut self.variance, block.steps() * n * channels);
         grow(&mut self.deltas, ((cut.segment + 1) * n + 1) * packed.delta_stride);
         for scratch in [&mut self.targets, &mut self.terms, &mut self.squares, &mut self.precisions] {
-            grow(scratch, cut.segment * n * packed.n_x);
+            grow(scratch, cut.segment * n * packed.n_y);
         }
     }
 }

@@ -30,7 +30,7 @@ fn an_interrupted_evaluation_ends_soon_and_goes_on_where_it_was() {
     let (data, scaling) = recorded();
     let wide = &conditions::WIDE;
     let experiment = wide.condition.networks[0].experiment(Preset::Fast, 1, None, &[]).unwrap();
-    let (network, states) = initialize(&experiment.topology(CHANNELS.len()).unwrap(), 1, 1);
+    let (network, states) = initialize(&experiment.bare_topology(CHANNELS.len()).unwrap(), 1, 1);
     let (study, engine) = (Interact { trials: 1, scanned: 2 }, Engine::serial());
     let folder = tempfile::tempdir().unwrap();
     let asked = Mutex::new(None::<Instant>);

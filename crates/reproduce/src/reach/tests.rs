@@ -17,7 +17,7 @@ fn networks() -> Vec<Learned> {
         let mut experiment = kind.experiment(Preset::Fast, 2, Some(1), &[]).unwrap();
         (experiment.data.sequences, experiment.data.steps) = (Some(3), Some(36));
         let source = source::load(&experiment.data, 2).unwrap();
-        let (network, initial_states) = initialize(&experiment.topology(6).unwrap(), 3, 2);
+        let (network, initial_states) = initialize(&experiment.bare_topology(6).unwrap(), 3, 2);
         let (training, history) = (TrainingFacts::none(kind.name), Vec::new());
         let scaling = experiment.data.scaling_for(&source.data).unwrap();
         Learned { name: kind.name, experiment, network, initial_states, scaling, source, history, training }

@@ -2,13 +2,17 @@
 
 use crate::memory::{complaint as complaint_about, product};
 
-use super::{Adam, Data, Experiment, Lbfgs, Momentum, Network, Output, ScalingChoice, TaskName, Training};
+use super::{
+    Adam, ClosedLoop, Data, Experiment, Lbfgs, Momentum, Network, OptimiserName, Output, ScalingChoice, SkipName, TaskName,
+    Training,
+};
 
 /// Most sequences and steps that a task is asked for, most units of a group, and the longest delay.
 const MOST_SEQUENCES: usize = 1_000_000;
 const MOST_STEPS: usize = 1_000_000_000;
 const MOST_UNITS: usize = 1_000_000;
 const MOST_DELAY: usize = 1_000_000;
+const MOST_LAGS: usize = 100;
 
 /// A value that will not do.
 #[derive(Debug, PartialEq)]
@@ -48,9 +52,16 @@ pub fn check(experiment: &Experiment) -> Check {
     must(folder, &["name"], format!("{name:?}"), "a name that a folder can have")?;
     check_data(&experiment.data)?;
     check_network(&experiment.network)?;
-    let Training { momentum, adam, lbfgs, .. } = &experiment.training;
+    let Training { momentum, adam, closed_loop, lbfgs, optimiser, .. } = &experiment.training;
     of_library(momentum.as_ref().map_or(Ok(()), Momentum::check))?;
     of_library(adam.as_ref().map_or(Ok(()), Adam::check))?;
+    of_library(closed_loop.as_ref().map_or(Ok(()), ClosedLoop::check))?;
+    if *optimiser == OptimiserName::Momentum {
+        let path = ["network", "initial_state_variance"];
+        must(experiment.network.initial_state_variance > 0.0, &path, 0, "a number above 0 with momentum; 0 needs adam")?;
+        let path = ["training", "closed_loop"];
+        must(closed_loop.is_none(), &path, "given with momentum", "optimiser = \"adam\"")?;
+    }
     of_library(lbfgs.as_ref().map_or(Ok(()), Lbfgs::check))?;
     check_output(&experiment.output)
 }
@@ -152,7 +163,17 @@ fn check_data(data: &Data) -> Check {
 fn check_network(network: &Network) -> Check {
     must((1..=MOST_DELAY).contains(&network.delay), &["network", "delay"], network.delay, "1 to 1e6 steps")?;
     not_negative(&["network", "variance_floor"], network.variance_floor)?;
-    positive(&["network", "initial_state_variance"], network.initial_state_variance)?;
+    not_negative(&["network", "initial_state_variance"], network.initial_state_variance)?;
+    let path = ["network", "skip_damping"];
+    if let Some(damping) = network.skip_damping {
+        must(network.skip == SkipName::Extrapolation, &path, damping, "no such key without skip = \"extrapolation\"")?;
+        must((0.0..=1.0).contains(&damping), &path, damping, "a number from 0 to 1")?;
+    }
+    let path = ["network", "skip_lags"];
+    if let Some(lags) = network.skip_lags {
+        must(network.skip == SkipName::Autoregressive, &path, lags, "no such key without skip = \"autoregressive\"")?;
+        must((1..=MOST_LAGS).contains(&lags), &path, lags, "1 to 100 differences")?;
+    }
     let groups = ["network", "groups"];
     must(!network.groups.is_empty(), &groups, "empty", "at least one group of context units")?;
     for (index, group) in network.groups.iter().enumerate() {

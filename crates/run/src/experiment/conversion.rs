@@ -3,29 +3,57 @@
 use std::path::{Path, PathBuf};
 
 use scrnn::dataset::Dataset;
+use scrnn::features::{Skip, SkipKind, velocity_deviations};
 use scrnn::learning::{Optimiser, Plan};
 use scrnn::scaling::Scaling;
 use scrnn::topology::{Prediction, Topology};
 
 use super::{
-    Data, Experiment, OptimiserName, ScalingChoice, ScalingConstants, ScalingName, ScalingRanges, TaskName,
+    Data, Experiment, MeanUnits, OptimiserName, ScalingChoice, ScalingConstants, ScalingName, ScalingRanges, SkipName, TaskName,
     TimeSourceName, Training,
 };
 use crate::failure::{Failure, Result};
 use scrnn_data::{Selection, TimeSource};
+
+/// Default share of the last change.
+const DAMPING: f64 = 0.7;
+/// Default number of differences.
+const LAGS: usize = 3;
 
 impl Experiment {
     /// The same experiment with every value explicit. `folder` is where its file lies.
     pub fn resolved(mut self, folder: &Path) -> Result<Self> {
         self.data.resolve(folder)?;
         self.training.resolve();
+        match self.network.skip {
+            SkipName::Extrapolation => _ = self.network.skip_damping.get_or_insert(DAMPING),
+            SkipName::Autoregressive => _ = self.network.skip_lags.get_or_insert(LAGS),
+            SkipName::None | SkipName::Residual => {}
+        }
         let a_thousandth = (self.training.epochs / 1000).max(1);
         self.output.history_every.get_or_insert(a_thousandth);
         Ok(self)
     }
 
-    /// The network's topology on `channels` channels.
-    pub fn topology(&self, channels: usize) -> Result<Topology> {
+    /// The network's topology on these data, which are in the network's units: constants of the skip connection and of velocity inputs
+    /// are fitted to them.
+    pub fn topology(&self, data: &Dataset) -> Result<Topology> {
+        let network = &self.network;
+        let mut topology = self.bare_topology(data.channels().len())?.with_linear_mean(network.mean == MeanUnits::Linear);
+        if network.velocity_inputs {
+            topology = topology.with_velocity_inputs(velocity_deviations(data))?;
+        }
+        let kind = match network.skip {
+            SkipName::None => return Ok(topology),
+            SkipName::Residual => SkipKind::Residual,
+            SkipName::Extrapolation => SkipKind::Extrapolation { damping: network.skip_damping.unwrap_or(DAMPING) },
+            SkipName::Autoregressive => SkipKind::Autoregressive { lags: network.skip_lags.unwrap_or(LAGS) },
+        };
+        Ok(topology.with_skip(Skip::fit(kind, data, network.delay)?)?)
+    }
+
+    /// The topology on `channels` channels, without what has to be fitted to data.
+    pub fn bare_topology(&self, channels: usize) -> Result<Topology> {
         let network = &self.network;
         let prediction = if network.variance {
             Prediction::MeanAndVariance { floor: network.variance_floor }
@@ -46,6 +74,7 @@ impl Experiment {
             it.epochs = training.epochs;
             it.initial_state_variance = self.network.initial_state_variance;
             it.optimiser = optimiser;
+            it.closed_loop = training.closed_loop.clone();
             it.lbfgs = training.lbfgs.clone();
             it.recompute = training.recompute;
             it.on_divergence = training.on_divergence;
@@ -140,7 +169,7 @@ const REACH: f64 = 1e150;
 fn check_reach(data: &Dataset, scaling: &Scaling) -> Result<()> {
     for (i, name) in data.channels().iter().enumerate() {
         let samples = || data.sequences().iter().flat_map(|s| s.values().iter().skip(i).step_by(data.channels().len()));
-        let largest = samples().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        let largest = samples().filter(|value| !value.is_nan()).fold(0.0_f64, |largest, value| largest.max(value.abs()));
         let scale = scaling.scale()[i].abs();
         let help = "bring the data to other units, or leave the channel out with `channels` in [data]";
         if largest > REACH {

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 pub use difference::{Difference, differences};
 pub use overrides::Override;
 pub use reading::{read, read_text};
-pub use scrnn::learning::{Adam, AdaptiveRate, Lbfgs, Momentum, OnDivergence, PriorStep};
+pub use scrnn::learning::{Adam, AdaptiveRate, ClosedLoop, Lbfgs, Momentum, OnDivergence, PriorStep};
 pub use scrnn::topology::Group;
 pub use scrnn_tasks::TaskName;
 
@@ -173,11 +173,59 @@ pub struct Network {
     /// Added to each predicted variance. The thesis has none: 0.
     #[serde(default)]
     pub variance_floor: f64,
-    /// Variance of the prior over initial states (2.15): large lets each sequence find its own, small keeps them together.
+    /// Variance of the prior over initial states (2.15): large lets each sequence find its own, small keeps them together, and with 0
+    /// all sequences share one.
     #[serde(default = "unit")]
     pub initial_state_variance: f64,
+    /// Whether the mean units are bounded, as in the thesis ("tanh"), or not ("linear").
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub mean: MeanUnits,
+    /// Whether the network sees, beside each sample, its difference to the one before.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub velocity_inputs: bool,
+    /// What the mean units add to: nothing, as in the thesis ("none"), the last sample ("residual"), the last sample and a share of its
+    /// last change ("extrapolation"), or a linear map of the last samples that is fitted to the data ("autoregressive"). For smooth
+    /// movements. Predicted means and variances are then in units of what is left to predict, and so is `variance_floor`.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub skip: SkipName,
+    /// For "extrapolation": the share of the last change, 0 to 1. Default 0.7.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub skip_damping: Option<f64>,
+    /// For "autoregressive": how many differences are used, one less than samples. Default 3.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub skip_lags: Option<usize>,
     /// The context units.
     pub groups: Vec<Group>,
+}
+
+/// What bounds a mean.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum MeanUnits {
+    /// y = tanh u, in -1 to 1 (2.4).
+    #[default]
+    Tanh,
+    /// y = u.
+    Linear,
+}
+
+/// What the mean units add to.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SkipName {
+    /// Nothing.
+    #[default]
+    None,
+    /// The last sample.
+    Residual,
+    /// The last sample and a share of its last change.
+    Extrapolation,
+    /// A linear map of the last samples, fitted to the data.
+    Autoregressive,
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 fn recover() -> OnDivergence {
@@ -217,6 +265,9 @@ pub struct Training {
     /// Options of "adam".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub adam: Option<Adam>,
+    /// Learns a part of the sequences in the closed loop, with "adam"; an empty table turns it on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub closed_loop: Option<ClosedLoop>,
     /// Lets L-BFGS make the last epochs; an empty table turns it on.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lbfgs: Option<Lbfgs>,

@@ -58,7 +58,7 @@ fn a_damaged_experiment_is_read_or_refused_and_never_a_panic() {
                 let resolved = experiment.resolved(Path::new("/")).unwrap();
                 let again = toml::to_string(&resolved).unwrap();
                 assert_eq!(read_text("again.toml", &again, &[]).unwrap(), resolved, "{again}");
-                let _ = (resolved.plan(), resolved.topology(2));
+                let _ = (resolved.plan(), resolved.bare_topology(2));
             }
             Err(failure) => {
                 refused += 1;

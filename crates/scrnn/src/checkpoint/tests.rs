@@ -139,9 +139,9 @@ fn the_optimiser_keeps_the_bits_of_nan_and_infinity() {
 #[test]
 fn a_newer_version_is_refused_whatever_else_it_holds() {
     let message = refused(&sample(), |record, _| *record = json!({ "format_version": 7, "shape": "unheard of" }));
-    assert_eq!(message, "format version 7 is newer than 1, which this program reads");
+    assert_eq!(message, "format version 7 is newer than 2, which this program reads");
     let error = Error::Checkpoint(message).to_string();
-    assert_eq!(error, "checkpoint: format version 7 is newer than 1, which this program reads");
+    assert_eq!(error, "checkpoint: format version 7 is newer than 2, which this program reads");
     let message = refused(&sample(), |record, _| record["format_version"] = json!(0));
     assert_eq!(message, "format version 0 does not exist");
 }
@@ -193,11 +193,11 @@ fn each_missing_tensor_is_named() {
 #[test]
 fn a_tensor_that_nothing_asks_for_is_named() {
     let message = refused(&sample(), |_, tensors| drop(tensors.insert("optimiser.extra".into(), f64s(&[1], &[0.0]))));
-    assert_eq!(message, "tensor optimiser.extra is not known to format version 1");
+    assert_eq!(message, "tensor optimiser.extra is not known to format version 2");
     let message = refused(&mean_only(), |_, tensors| {
         tensors.insert("variance_bias".into(), f64s(&[2], &[0.0, 0.0]));
     });
-    assert_eq!(message, "tensor variance_bias is not known to format version 1");
+    assert_eq!(message, "tensor variance_bias is not known to format version 2");
 }
 
 #[test]

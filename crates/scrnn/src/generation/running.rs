@@ -6,6 +6,7 @@ use rand::rngs::ChaCha8Rng;
 use super::{Feedback, check, draw, input};
 use crate::engine::{Engine, InstructionSet, Run};
 use crate::error::{Error, Result};
+use crate::features::{Features, Past};
 use crate::network::Network;
 use crate::packed::Packed;
 use crate::stepper::Stepper;
@@ -21,13 +22,18 @@ pub struct Running {
     feedback: Feedback,
     random: ChaCha8Rng,
     delay: usize,
-    floor: f64,
+    features: Features,
     has_variance: bool,
     steps: usize,
+    /// The inputs so far, as far back as the features need them.
+    past: Past,
+    x: Vec<f64>,
+    guess: Vec<f64>,
     /// v of the last step, with the floor.
     variance: Vec<f64>,
-    /// The samples of the last xi steps; that of step k is at k modulo xi.
+    /// The samples of the last xi steps, and their means; that of step k is at k modulo xi.
     fed_back: Vec<f64>,
+    means: Vec<f64>,
 }
 
 impl Running {
@@ -44,8 +50,8 @@ impl Running {
         engine: &Engine,
     ) -> Result<Self> {
         let topology = &network.topology;
-        let (n_x, n_c, delay) = (topology.channels(), topology.context_units(), topology.delay());
-        check(&feedback, n_x)?;
+        let (n_y, n_c, delay) = (topology.channels(), topology.context_units(), topology.delay());
+        check(&feedback, n_y)?;
         if initial_state.len() != n_c {
             let what = "the initial state".to_owned();
             return Err(Error::Length { what, found: initial_state.len(), needed: n_c });
@@ -57,6 +63,7 @@ impl Running {
         stepper.start(&packed, 0, initial_state);
         set.run(Enter { stepper: &mut stepper, packed: &packed });
         let has_variance = topology.has_variance();
+        let features = Features::new(topology);
         Ok(Self {
             packed,
             stepper,
@@ -64,37 +71,48 @@ impl Running {
             feedback,
             random: stream(seed, Purpose::Generation, 0),
             delay,
-            floor: topology.variance_floor(),
+            past: Past::new(&features),
+            features,
             has_variance,
             steps: 0,
-            variance: vec![0.0; if has_variance { n_x } else { 0 }],
-            fed_back: vec![0.0; delay * n_x],
+            x: vec![0.0; n_y],
+            guess: vec![0.0; n_y],
+            variance: vec![0.0; if has_variance { n_y } else { 0 }],
+            fed_back: vec![0.0; delay * n_y],
+            means: vec![0.0; delay * n_y],
         })
     }
 
     /// Takes in the sample of this step, as far as the feedback senses it, and predicts the sample xi steps ahead. The
-    /// first xi steps take it in whole, since nothing was predicted for them.
+    /// first xi steps take it in whole, since nothing was predicted for them. A value that is missing (NaN) is stood in for by the mean
+    /// that was predicted for it, before that by the channel's last input, or 0.
     ///
     /// # Errors
     /// [`Error::Length`] for a sample of another size; it is not taken in.
     pub fn step(&mut self, sensed: &[f64]) -> Result<()> {
-        let n_x = self.packed.n_x;
-        if sensed.len() != n_x {
-            return Err(Error::Length { what: "the sample".to_owned(), found: sensed.len(), needed: n_x });
+        let n_y = self.packed.n_y;
+        if sensed.len() != n_y {
+            return Err(Error::Length { what: "the sample".to_owned(), found: sensed.len(), needed: n_y });
         }
-        let slot = (self.steps % self.delay) * n_x;
-        let predicted = (self.steps >= self.delay).then(|| &self.fed_back[slot..slot + n_x]);
-        input(self.stepper.input(&self.packed, 0), &self.feedback, Some(sensed), predicted);
+        let slot = (self.steps % self.delay) * n_y;
+        let slot = slot..slot + n_y;
+        let predicted = (&self.fed_back[slot.clone()], &self.means[slot.clone()]);
+        self.x.copy_from_slice(self.past.at(0));
+        input(&mut self.x, &self.feedback, Some(sensed), (self.steps >= self.delay).then_some(predicted));
+        self.past.push(&self.x);
+        self.features.inputs(|back| self.past.at(back), self.stepper.input(&self.packed, 0));
         self.set.run(Step { stepper: &mut self.stepper, packed: &self.packed });
 
-        let mean = self.stepper.mean(&self.packed, 0);
-        let fed_back = &mut self.fed_back[slot..slot + n_x];
-        let raw = self.stepper.variance(&self.packed, 0);
-        for (i, (&y, rule)) in mean.iter().zip(&self.feedback.0).enumerate() {
+        let (rho, exp_u) = (self.stepper.mean(&self.packed, 0), self.stepper.variance(&self.packed, 0));
+        self.features.guess(|back| self.past.at(back), &mut self.guess);
+        let (fed_back, means) = (&mut self.fed_back[slot.clone()], &mut self.means[slot]);
+        for (i, (&rho, rule)) in rho.iter().zip(&self.feedback.0).enumerate() {
+            let y = self.features.mean(i, self.guess[i], rho);
+            means[i] = y;
             fed_back[i] = match self.has_variance {
                 false => y,
                 true => {
-                    self.variance[i] = raw[i] + self.floor;
+                    self.variance[i] = self.features.variance(i, exp_u[i]);
                     draw(&mut self.random, y, self.variance[i], rule.noise)
                 }
             };
@@ -108,7 +126,7 @@ impl Running {
     /// # Errors
     /// As [`Running::new`].
     pub fn set_feedback(&mut self, feedback: Feedback) -> Result<()> {
-        check(&feedback, self.packed.n_x)?;
+        check(&feedback, self.packed.n_y)?;
         self.feedback = feedback;
         Ok(())
     }
@@ -119,10 +137,11 @@ impl Running {
         self.steps
     }
 
-    /// y of the last step, N_O values.
+    /// y of the last step, N_O values; 0 before the first.
     #[must_use]
     pub fn mean(&self) -> &[f64] {
-        self.stepper.mean(&self.packed, 0)
+        let slot = (self.steps.saturating_sub(1) % self.delay) * self.packed.n_y;
+        &self.means[slot..slot + self.packed.n_y]
     }
 
     /// v of the last step, N_O values; empty without variance units.
@@ -135,16 +154,16 @@ impl Running {
     /// fed back.
     #[must_use]
     pub fn sample(&self) -> &[f64] {
-        let slot = (self.steps.saturating_sub(1) % self.delay) * self.packed.n_x;
-        &self.fed_back[slot..slot + self.packed.n_x]
+        let slot = (self.steps.saturating_sub(1) % self.delay) * self.packed.n_y;
+        &self.fed_back[slot..slot + self.packed.n_y]
     }
 
     /// The oldest sample that is still to be fed back, N_O values: the prediction of the next step's input. It is 0 as
     /// long as fewer than xi steps are taken.
     #[must_use]
     pub fn due(&self) -> &[f64] {
-        let slot = (self.steps % self.delay) * self.packed.n_x;
-        &self.fed_back[slot..slot + self.packed.n_x]
+        let slot = (self.steps % self.delay) * self.packed.n_y;
+        &self.fed_back[slot..slot + self.packed.n_y]
     }
 
     /// c after the last step, N_C values.

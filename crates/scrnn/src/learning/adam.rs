@@ -65,7 +65,7 @@ pub(super) struct Batch<'a> {
     /// The number of this update, from 1.
     pub update: u64,
     pub runs: &'a [Run],
-    /// Their steps times the channels.
+    /// Their steps times the channels, less what is missing.
     pub terms: f64,
 }
 
@@ -91,12 +91,11 @@ impl AdamRule {
         options: Adam,
         topology: &Topology,
         states: &InitialStates,
-        total_steps: usize,
+        terms: f64,
         variance: f64,
         epochs: u64,
     ) -> Self {
         let parameters = Parameters::zeros(topology).as_slice().len();
-        let terms = (total_steps * topology.channels()) as f64;
         Self {
             options,
             guarded: 1.0,
@@ -237,7 +236,7 @@ mod tests {
         let (mut network, mut states) = crate::initialization::initialize(&topology, 1, 5);
         network.parameters.as_mut_slice().fill(0.5);
         let options = Adam { rate: 0.1, warm_up: 0.0, weight_decay: 0.2, ..Adam::default() };
-        let mut rule = AdamRule::new(options, &topology, &states, 10, 1.0, 10);
+        let mut rule = AdamRule::new(options, &topology, &states, 10.0, 1.0, 10);
         // Without a gradient nothing else moves.
         let mut evaluation = Evaluation::new(&topology);
         evaluation.resize(1);
@@ -254,7 +253,7 @@ mod tests {
         let topology = Topology::s_ctrnn(1, 2, 2.0).unwrap();
         let (mut network, mut states) = crate::initialization::initialize(&topology, 3, 5);
         let options = Adam { rate: 0.1, warm_up: 0.0, mean_factor: 0.0, ..Adam::default() };
-        let mut rule = AdamRule::new(options, &topology, &states, 10, 1.0, 10);
+        let mut rule = AdamRule::new(options, &topology, &states, 10.0, 1.0, 10);
         let (mut evaluation, before) = (Evaluation::new(&topology), states.clone());
         evaluation.initial = vec![1.0, 2.0, -1.0, 5.0];
         let batch = Batch { epoch: 0, update: 1, runs: &[Run::new(2, 10), Run::new(0, 10)], terms: 20.0 };
@@ -275,7 +274,7 @@ mod tests {
         let topology = Topology::s_ctrnn(1, 2, 2.0).unwrap();
         let states = InitialStates::zeros(&topology, 1);
         let adam = Adam { rate: 2.0, warm_up: 0.1, final_rate: 0.5, ..Adam::default() };
-        let rule = AdamRule::new(adam, &topology, &states, 10, 1.0, 100);
+        let rule = AdamRule::new(adam, &topology, &states, 10.0, 1.0, 100);
         assert_eq!((rule.rate(0), rule.rate(9), rule.rate(10)), (0.2, 2.0, 2.0));
         assert!((rule.rate(55) - 1.25).abs() < 1e-12);
         assert!((rule.rate(100) - 0.5).abs() < 1e-12);

@@ -9,14 +9,17 @@
 
 use std::ops::Range;
 
+use rand::RngExt;
 use rand::seq::SliceRandom;
 
 use super::adam::{self, AdamRule};
+use super::plan::ClosedLoop;
 use super::state::Fields;
 use super::state::{OptimiserState, StateTensor};
 use crate::error::Result;
+use crate::dataset::Dataset;
 use crate::initial_states::InitialStates;
-use crate::objective::{Evaluation, Objective, Run, Want};
+use crate::objective::{Evaluation, Objective, Release, Run, Want};
 use crate::parameters::{Gradients, Parameters};
 use crate::streams::{Purpose, stream};
 use crate::topology::Topology;
@@ -37,7 +40,12 @@ pub(super) struct Batches {
     order: Vec<usize>,
     /// u_0 of one batch, [run][unit].
     initial: Vec<f64>,
-    channels: usize,
+    /// T N_O of each sequence, less what is missing.
+    targets: Vec<usize>,
+    delay: usize,
+    closed_loop: Option<ClosedLoop>,
+    /// Which sequences an epoch releases: scratch.
+    shuffled: Vec<usize>,
     /// The gradient of all batches together.
     total: Vec<f64>,
     /// ln L_out of each sequence, as last evaluated.
@@ -53,25 +61,31 @@ const LN_LIKELIHOODS: &str = "batches.ln_likelihood";
 const SQUARED_ERRORS: &str = "batches.squared_error";
 const GRADIENT_NORM: &str = "batches.gradient_norm";
 
-/// Steps times channels.
-fn terms(runs: &[Run], channels: usize) -> f64 {
-    (runs.iter().map(|run| run.steps).sum::<usize>() * channels) as f64
+/// Steps times channels, less what is missing.
+fn terms(runs: &[Run], targets: &[usize]) -> f64 {
+    runs.iter().map(|run| targets[run.sequence]).sum::<usize>() as f64
 }
 
 impl Batches {
     /// Deals the sequences, through each of which there is a run, into batches of `size` at most, none of which differs from another
     /// by more than one.
-    pub fn new(objective: Box<dyn Objective>, topology: &Topology, runs: Vec<Run>, size: usize) -> Self {
+    pub fn new(objective: Box<dyn Objective>, topology: &Topology, data: &Dataset, size: usize) -> Self {
+        let runs = Run::through_all(data, topology.delay());
         let count = runs.len();
+        let targets = |run: &Run| data.sequences()[run.sequence].targets(topology.delay(), run.steps);
         let mut batches = Self {
             objective,
             evaluation: Evaluation::new(topology),
+            targets: runs.iter().map(targets).collect(),
             dealt: runs.clone(),
             runs,
             ends: Vec::new(),
             order: Vec::new(),
             initial: Vec::new(),
-            channels: topology.channels(),
+
+            delay: topology.delay(),
+            closed_loop: None,
+            shuffled: Vec::new(),
             total: Parameters::zeros(topology).as_slice().to_vec(),
             ln_likelihoods: vec![0.0; count],
             squared_errors: vec![0.0; count],
@@ -102,6 +116,30 @@ impl Batches {
         }
         self.order.clear();
         self.order.extend(0..count);
+    }
+
+    /// Learns in the closed loop as well; with `None`, no more.
+    pub fn close_loop(&mut self, closed_loop: Option<ClosedLoop>) {
+        self.closed_loop = closed_loop;
+    }
+
+    /// Chooses which sequences an epoch releases and where, the same for the same epoch; without one all are taught.
+    pub fn release(&mut self, epoch: Option<u64>) {
+        self.dealt.iter_mut().for_each(|run| run.release = None);
+        let (Some(options), Some(epoch)) = (&self.closed_loop, epoch) else { return };
+        let mut random = stream(0, Purpose::ClosedLoopStarts, epoch);
+        let count = self.dealt.len();
+        self.shuffled.clear();
+        self.shuffled.extend(0..count);
+        self.shuffled.shuffle(&mut random);
+        // Half of an odd number is rounded now up, now down.
+        let taught = (options.taught * count as f64 + random.random::<f64>()).floor() as usize;
+        for &index in self.shuffled.iter().skip(taught.min(count)) {
+            let run = &mut self.dealt[index];
+            let share = options.earliest + (options.latest - options.earliest) * random.random::<f64>();
+            let step = ((share * run.steps as f64).round() as usize).max(self.delay);
+            *run = run.released(Release::new(step, random.random()));
+        }
     }
 
     /// How many there are.
@@ -158,7 +196,7 @@ impl Batches {
             self.evaluate_batch(index, parameters, states);
             self.total.iter_mut().zip(self.evaluation.gradients.as_slice()).for_each(|(sum, g)| *sum += g);
         }
-        self.gradient_norm = norm(&self.total) / terms(&self.runs, self.channels);
+        self.gradient_norm = norm(&self.total) / terms(&self.runs, &self.targets);
     }
 
     /// Makes an epoch's updates. Whether their values stand for the epoch that follows: where there is one batch, they are those
@@ -169,6 +207,7 @@ impl Batches {
         if count > 1 {
             self.order.sort_unstable();
             self.order.shuffle(&mut stream(0, Purpose::BatchOrder, epoch));
+            self.release(Some(epoch));
         }
         rule.begin_epoch(states);
         for nth in 0..count {
@@ -181,13 +220,13 @@ impl Batches {
             }
             let runs = &self.dealt[self.part(index)];
             let update = epoch * count as u64 + nth as u64 + 1;
-            let batch = adam::Batch { epoch, update, runs, terms: terms(runs, self.channels) };
+            let batch = adam::Batch { epoch, update, runs, terms: terms(runs, &self.targets) };
             rule.ascend(&batch, &self.evaluation, parameters, states);
         }
         rule.end_epoch(states);
         if count > 1 {
             let runs = &self.dealt[self.part(self.order[count - 1])];
-            self.gradient_norm = norm(self.evaluation.gradients.as_slice()) / terms(runs, self.channels);
+            self.gradient_norm = norm(self.evaluation.gradients.as_slice()) / terms(runs, &self.targets);
         }
         count > 1
     }
@@ -269,7 +308,7 @@ mod tests {
         let sequences = samples.iter().map(|own| Sequence::new("", 1, own.clone()).unwrap()).collect();
         let data = Dataset::new(vec!["y".into()], sequences).unwrap();
         let objective = Engine::serial().objective(&Request::new(topology, &data)).unwrap();
-        Batches::new(objective, topology, Run::through_all(&data, 1), size)
+        Batches::new(objective, topology, &data, size)
     }
 
     #[test]
@@ -286,7 +325,7 @@ mod tests {
             dealt.sort_unstable();
             assert_eq!(dealt, (0..count).collect::<Vec<_>>());
             // 8 steps of the first sequence, 9 of the second, ...
-            let terms: f64 = parts.iter().map(|part| terms(part, 1)).sum();
+            let terms: f64 = parts.iter().map(|part| terms(part, &batches.targets)).sum();
             assert_eq!(terms, (0..count).map(|s| 8.0 + s as f64).sum::<f64>());
         }
     }
@@ -321,7 +360,7 @@ mod tests {
         for epoch in [0, 1, 2] {
             let start = initialize(&topology, 7, 3);
             let (mut network, mut states) = start.clone();
-            let total = samples.iter().map(|own| own.len() - 1).sum();
+            let total = samples.iter().map(|own| (own.len() - 1) as f64).sum();
             let rule = || AdamRule::new(Adam::default(), &topology, &start.1, total, 1.0, 10);
             let mut batches = of(&samples, 2, &topology);
             assert!(batches.ascend(&mut rule(), epoch, (&mut network.parameters, &mut states)));
@@ -340,7 +379,7 @@ mod tests {
                     assert!(met[run.sequence].is_nan());
                     met[run.sequence] = single.ln_likelihoods[run.sequence];
                 }
-                let batch = adam::Batch { epoch, update: 4 * epoch + nth as u64 + 1, runs, terms: terms(runs, 1) };
+                let batch = adam::Batch { epoch, update: 4 * epoch + nth as u64 + 1, runs, terms: terms(runs, &single.targets) };
                 rule.ascend(&batch, &single.evaluation, &mut by_hand.parameters, &mut own_states);
             }
             rule.end_epoch(&mut own_states);

@@ -255,7 +255,7 @@ mod tests {
     use crate::dataset::{Dataset, Sequence};
     use crate::engine::Engine;
     use crate::initialization::initialize;
-    use crate::objective::{Backend, Request, Run};
+    use crate::objective::{Backend, Request};
     use crate::parameters::Block;
     use crate::topology::{Group, Prediction};
 
@@ -264,7 +264,7 @@ mod tests {
         let sequences: Vec<_> = samples.iter().map(|own| Sequence::new("", 1, own.clone()).unwrap()).collect();
         let data = Dataset::new(vec!["y".into()], sequences).unwrap();
         let objective = Engine::serial().objective(&Request::new(topology, &data)).unwrap();
-        Batches::new(objective, topology, Run::through_all(&data, 1), samples.len())
+        Batches::new(objective, topology, &data, samples.len())
     }
 
     /// A network with learned and unlearned initial states on two sequences, its batches and a rule.

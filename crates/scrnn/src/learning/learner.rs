@@ -13,7 +13,7 @@ use crate::dataset::Dataset;
 use crate::error::{Error, Result};
 use crate::initial_states::InitialStates;
 use crate::network::Network;
-use crate::objective::{Backend, Request, Run};
+use crate::objective::{Backend, ClosedLoopTerm, Request};
 use std::ops::ControlFlow;
 
 /// What the evaluation of an epoch found.
@@ -146,7 +146,7 @@ impl Learner {
     /// backend cannot compute.
     pub fn new(
         network: Network,
-        initial_states: InitialStates,
+        mut initial_states: InitialStates,
         data: &Dataset,
         plan: Plan,
         backend: &dyn Backend,
@@ -164,16 +164,23 @@ impl Learner {
             return Err(Error::Length { what: "each initial state".to_owned(), found: units, needed });
         }
         let delay = topology.delay();
-        let total = data.total_steps(delay);
+        let terms = data.total_targets(delay) as f64;
+        if terms == 0.0 {
+            return Err(Error::Setting {
+                what: "number of values that can be learned",
+                found: "0: all are missing".to_owned(),
+                needed: "at least 1",
+            });
+        }
         let variance = plan.initial_state_variance;
         let first = plan.epochs_of_optimiser();
         let rule = match &plan.optimiser {
             Optimiser::Momentum(options) => {
-                Rule::Momentum(MomentumRule::new(options.clone(), topology, &initial_states, total, variance))
+                Rule::Momentum(MomentumRule::new(options.clone(), topology, &initial_states, terms, variance))
             }
             Optimiser::Adam(options) => {
                 let options = options.clone();
-                Rule::Adam(AdamRule::new(options, topology, &initial_states, total, variance, first))
+                Rule::Adam(AdamRule::new(options, topology, &initial_states, terms, variance, first))
             }
         };
         let batch_size = match &plan.optimiser {
@@ -182,16 +189,20 @@ impl Learner {
         };
         let mut request = Request::new(topology, data);
         request.recompute = plan.recompute;
+        request.closed_loop = plan.closed_loop.as_ref().map(|it| ClosedLoopTerm::new(it.copies, it.weight));
         let objective = backend.objective(&request)?;
-        let mut batches = Batches::new(objective, topology, Run::through_all(data, delay), batch_size);
+        let mut batches = Batches::new(objective, topology, data, batch_size);
+        batches.close_loop(plan.closed_loop.clone());
         if plan.lbfgs.is_some() && batches.count() > 1 {
             // A first pass of all at once takes the memory, so that no epoch does.
             batches.deal(sequences);
             batches.evaluate(&network.parameters, &initial_states);
             batches.deal(batch_size);
         }
-        let terms = (total * topology.channels()) as f64;
         let lbfgs = plan.lbfgs.as_ref().map(|options| LbfgsRule::new(options, topology, sequences, terms, variance));
+        if variance == 0.0 {
+            initial_states.share(topology);
+        }
         let state = State { network, initial_states, rule, epoch: 0 };
         let guard = (plan.on_divergence == OnDivergence::Recover).then(|| Guard::new(&state));
         let last_good = state.clone();
@@ -349,6 +360,9 @@ impl Learner {
 
     fn evaluate(&mut self) {
         if !self.evaluated {
+            // What an update climbs is evaluated with its closed loops, what is only reported without.
+            let climbs = self.batches.count() == 1 && !self.refines() && self.state.epoch < self.plan.epochs;
+            self.batches.release(climbs.then_some(self.state.epoch));
             self.batches.evaluate(&self.state.network.parameters, &self.state.initial_states);
             self.evaluated = true;
         }
@@ -388,7 +402,7 @@ impl Learner {
     /// The sequence of the lowest likelihood a step.
     fn least_likely(&self) -> usize {
         let delay = self.state.network.topology.delay();
-        let steps = self.data.sequences().iter().map(|sequence| (sequence.len() - delay) as f64);
+        let steps = self.data.sequences().iter().map(|own| own.targets(delay, own.len() - delay).max(1) as f64);
         let each = self.batches.ln_likelihoods.iter().zip(steps).map(|(ln_likelihood, steps)| ln_likelihood / steps);
         each.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(s, _)| s)
     }

@@ -16,7 +16,7 @@ mod state;
 pub use divergence::Divergence;
 pub use guard::Recovery;
 pub use learner::{EpochReport, Learner, Observer, Outcome};
-pub use plan::{Adam, AdaptiveRate, Lbfgs, Momentum, OnDivergence, Optimiser, Plan, PriorStep};
+pub use plan::{Adam, AdaptiveRate, ClosedLoop, Lbfgs, Momentum, OnDivergence, Optimiser, Plan, PriorStep};
 pub use state::{OptimiserState, StateTensor};
 
 #[cfg(test)]

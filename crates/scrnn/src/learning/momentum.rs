@@ -45,12 +45,12 @@ impl MomentumRule {
         options: Momentum,
         topology: &Topology,
         states: &InitialStates,
-        total_steps: usize,
+        terms: f64,
         variance: f64,
     ) -> Self {
         let n_o = topology.channels() as f64;
         Self {
-            rates: (options.rate / (total_steps as f64 * n_o), options.rate / n_o),
+            rates: (options.rate / terms, options.rate / n_o),
             gradient: (options.prior == PriorStep::Thesis).then(|| InitialStates::zeros(topology, states.sequences())),
             options,
             shared: vec![0.0; Parameters::zeros(topology).as_slice().len()],
@@ -166,7 +166,7 @@ mod tests {
             let mut states = InitialStates::zeros(&topology, 3);
             let mut parameters = Parameters::zeros(&topology);
             let options = Momentum { rate: 0.01, prior, ..Momentum::default() };
-            let mut rule = MomentumRule::new(options, &topology, &states, 10, variance);
+            let mut rule = MomentumRule::new(options, &topology, &states, 10.0, variance);
             for _ in 0..3000 {
                 let g: Vec<f64> = a.iter().zip(states.values()).map(|(a, u)| a - u).collect();
                 rule.accumulate(&topology, &gradients, &g, &states);

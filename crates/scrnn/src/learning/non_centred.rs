@@ -25,7 +25,8 @@ impl NonCentred {
     pub fn new(topology: &Topology, variance: f64) -> Self {
         let s = variance.sqrt().min(1.0);
         let learns = topology.per_unit(|group| group.learns_initial_state).collect();
-        Self { s, pull: s * s / variance, learns }
+        // Where all share one state, z is 0 and stays so.
+        Self { s, pull: if variance > 0.0 { s * s / variance } else { 1.0 }, learns }
     }
 
     /// (s / sigma_IS)^2: ln L_init is -z^2 / 2 times that, but for a constant.
@@ -38,7 +39,7 @@ impl NonCentred {
         let units = self.learns.len();
         for (z, u0) in z.chunks_exact_mut(units).zip(states.values().chunks_exact(units)) {
             for (i, (z, u0)) in z.iter_mut().zip(u0).enumerate() {
-                *z = if self.learns[i] { (u0 - states.mean()[i]) / self.s } else { 0.0 };
+                *z = if self.learns[i] && self.s > 0.0 { (u0 - states.mean()[i]) / self.s } else { 0.0 };
             }
         }
     }

@@ -9,10 +9,13 @@ pub struct Plan {
     /// Passes through the data; each is one update, but for Adam in batches. An epoch of L-BFGS is an update, and now and then more
     /// than one pass.
     pub epochs: u64,
-    /// sigma^2_IS, the variance of the initial states around their mean (2.13).
+    /// sigma^2_IS, the variance of the initial states around their mean (2.13). 0 makes all sequences share one initial state, the
+    /// mean: only what a network hears then tells it which sequence it is in. Momentum needs one above 0.
     pub initial_state_variance: f64,
     /// How to ascend.
     pub optimiser: Optimiser,
+    /// Whether a part of the sequences is learned in the closed loop, by Adam only.
+    pub closed_loop: Option<ClosedLoop>,
     /// Whether the last epochs ascend by L-BFGS instead.
     pub lbfgs: Option<Lbfgs>,
     /// Keep only a part of the states and compute the rest again on the way back: memory grows with the square root of
@@ -40,6 +43,7 @@ impl Default for Plan {
             epochs: 100_000,
             initial_state_variance: 1.0,
             optimiser: Optimiser::Momentum(Momentum::default()),
+            closed_loop: None,
             lbfgs: None,
             recompute: false,
             on_divergence: OnDivergence::Stop,
@@ -172,6 +176,54 @@ impl Default for Adam {
     }
 }
 
+/// Learning in the closed loop. In each update a share of the sequences is taught up to some step and goes on from there on the
+/// network's own predictions and their noise, in several copies. What the copies predict together is a Gaussian of their mean and
+/// their variance, and its likelihood is climbed together with that of the taught steps
+/// ([`crate::objective::ClosedLoopTerm`]). An epoch takes as much longer as there are copies.
+///
+/// A network that was only ever taught does not know what to do where its own errors have led it, and its variance says nothing of
+/// that.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
+#[non_exhaustive]
+pub struct ClosedLoop {
+    /// K, how many loops are averaged.
+    pub copies: usize,
+    /// What a step in the closed loop counts; a taught one counts 1.
+    pub weight: f64,
+    /// Share of the sequences of an epoch that are taught throughout.
+    pub taught: f64,
+    /// Where the loop is closed, at the earliest, as a share of the sequence.
+    pub earliest: f64,
+    /// And at the latest. In between every step is as likely.
+    pub latest: f64,
+}
+
+impl Default for ClosedLoop {
+    fn default() -> Self {
+        Self { copies: 4, weight: 0.3, taught: 0.5, earliest: 0.05, latest: 0.9 }
+    }
+}
+
+impl ClosedLoop {
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] names the first one that is out of its range, e.g. `closed_loop.copies`.
+    pub fn check(&self) -> Result<()> {
+        let sound = (1..=1000).contains(&self.copies);
+        require("closed_loop.copies", self.copies as f64, sound, "a number from 1 to 1000")?;
+        not_negative("closed_loop.weight", self.weight)?;
+        let share = |what, value: f64| require(what, value, (0.0..=1.0).contains(&value), "a number from 0 to 1");
+        share("closed_loop.taught", self.taught)?;
+        share("closed_loop.earliest", self.earliest)?;
+        share("closed_loop.latest", self.latest)?;
+        require("closed_loop.latest", self.latest, self.latest >= self.earliest, "at least closed_loop.earliest")
+    }
+}
+
 /// L-BFGS on ln L_all per step and channel, over all sequences at once, for the last epochs of a training. Each of its epochs is
 /// an update, which evaluates the sequences as often as its line search asks for: 1.1 times on average, where the likelihood is
 /// smooth. ln L_all never falls. Initial states are written as for [`Adam`].
@@ -209,7 +261,15 @@ impl Plan {
     /// # Errors
     /// [`Error::Setting`] names the first one that is out of its range, e.g. `adam.rate`.
     pub fn check(&self) -> Result<()> {
-        positive("initial_state_variance", self.initial_state_variance)?;
+        not_negative("initial_state_variance", self.initial_state_variance)?;
+        if let Some(closed_loop) = &self.closed_loop {
+            closed_loop.check()?;
+        }
+        if let Optimiser::Momentum(_) = &self.optimiser {
+            positive("initial_state_variance (with momentum)", self.initial_state_variance)?;
+            let closed = self.closed_loop.is_some();
+            require("closed_loop (with momentum)", 1.0, !closed, "adam, which alone learns in the closed loop")?;
+        }
         if let Some(lbfgs) = &self.lbfgs {
             lbfgs.check()?;
         }
@@ -287,7 +347,7 @@ macro_rules! with {
     )*};
 }
 
-with!(Plan, Momentum, AdaptiveRate, Adam, Lbfgs);
+with!(Plan, Momentum, AdaptiveRate, Adam, ClosedLoop, Lbfgs);
 
 fn positive(what: &'static str, value: f64) -> Result<()> {
     require(what, value, value > 0.0, "a number above 0")

@@ -126,6 +126,9 @@ fn stopping_and_restoring_goes_on_bit_for_bit() {
         adam(60),
         batches(60),
         narrow,
+        Plan { initial_state_variance: 0.0, ..adam(60) },
+        Plan { closed_loop: Some(ClosedLoop::default()), ..adam(60) },
+        Plan { closed_loop: Some(ClosedLoop::default()), ..batches(60) },
         refined(adam(60), 0.8),
         refined(batches(60), 0.8),
     ] {
@@ -352,7 +355,15 @@ fn a_narrow_prior_is_stable_for_the_implicit_step_and_for_adam_only() {
 #[test]
 fn settings_out_of_range_are_refused_by_name() {
     let refuse = |plan: Plan| plan.check().unwrap_err().to_string();
-    assert!(refuse(Plan { initial_state_variance: 0.0, ..Plan::default() }).contains("initial_state_variance is 0"));
+    assert!(refuse(Plan { initial_state_variance: -1.0, ..Plan::default() }).contains("initial_state_variance is -1"));
+    let shared = Plan { initial_state_variance: 0.0, ..Plan::default() };
+    assert!(refuse(shared).contains("initial_state_variance (with momentum) is 0"));
+    let closed = |change: &dyn Fn(&mut ClosedLoop)| refuse(Plan { closed_loop: Some(ClosedLoop::with(|it| change(it))), ..adam(1) });
+    assert!(closed(&|it| it.copies = 0).contains("closed_loop.copies is 0"));
+    assert!(closed(&|it| it.taught = 1.5).contains("closed_loop.taught is 1.5"));
+    assert!(closed(&|it| it.latest = 0.01).contains("closed_loop.latest is 0.01; needed: at least closed_loop.earliest"));
+    let by_momentum = Plan { closed_loop: Some(ClosedLoop::default()), ..Plan::default() };
+    assert!(refuse(by_momentum).contains("closed_loop (with momentum)"));
     assert!(refuse(momentum(1, Momentum { momentum: 1.0, ..Momentum::default() })).contains("momentum.momentum is 1"));
     assert!(refuse(refined(adam(1), 1.5)).contains("lbfgs.share is 1.5"));
     let none = Plan { lbfgs: Some(Lbfgs { memory: 0, ..Lbfgs::default() }), ..adam(1) };
@@ -488,4 +499,44 @@ fn a_state_without_a_guard_is_taken_up_by_one_and_a_broken_one_is_refused() {
         less.numbers.remove(index);
         assert!(take_up(&less).unwrap_err().to_string().contains("is missing"), "{name}");
     }
+}
+
+#[test]
+fn sequences_that_share_one_initial_state_start_from_their_mean() {
+    let mut learner = learner(Plan { initial_state_variance: 0.0, ..adam(80) }, 1);
+    let start = learner.initial_states().mean().to_vec();
+    let (_, history) = run(&mut learner);
+    let states = learner.initial_states();
+    assert!(history[80] > history[0] + 10.0 && states.mean() != start);
+    assert!((0..3).all(|s| states.sequence(s) == states.mean()));
+    assert_eq!(states.ln_prior(learner.network().topology(), 0.0), 0.0);
+}
+
+#[test]
+fn what_is_missing_is_learned_around() {
+    let whole = waves(3, 60);
+    // Every fourth value, another one in each sequence.
+    let punched = |s: usize, sequence: &Sequence| {
+        let values = sequence.values().iter().enumerate();
+        Sequence::new("", 1, values.map(|(k, x)| if (k + s) % 4 == 0 { f64::NAN } else { *x }).collect()).unwrap()
+    };
+    let sequences = whole.sequences().iter().enumerate().map(|(s, own)| punched(s, own)).collect();
+    let data = Dataset::new(vec!["y".into()], sequences).unwrap();
+    assert_eq!((data.missing(), data.total_targets(1)), (45, 3 * 59 - 44));
+    let topology = Topology::s_ctrnn(1, 8, 2.0).unwrap();
+    let (network, states) = initialize(&topology, 3, 5);
+    let mut learner = Learner::new(network, states, &data, adam(400), &Engine::serial()).unwrap();
+    let mut nll = Vec::new();
+    let outcome = learner.run(&mut |report: &EpochReport, _: &Learner| {
+        nll.push(report.nll.unwrap());
+        assert!((report.nll.unwrap() + report.ln_likelihood / 133.0).abs() < 1e-12);
+        ControlFlow::Continue(())
+    });
+    assert_eq!(outcome, Outcome::Finished);
+    assert!(nll[400] < nll[0] - 1.0, "{} to {}", nll[0], nll[400]);
+
+    let none = waves(2, 9).map(|_, _| f64::NAN);
+    let (network, states) = initialize(&topology, 2, 5);
+    let refused = Learner::new(network, states, &none, adam(1), &Engine::serial()).unwrap_err().to_string();
+    assert!(refused.contains("all are missing"), "{refused}");
 }

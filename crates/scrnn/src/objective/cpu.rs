@@ -3,6 +3,9 @@
 //! Blocks are worked on by any thread; their gradients are added in the order of the blocks, so the bits do not depend
 //! on the number of threads. All memory is taken on the calling thread, for the largest list of runs so far; an evaluation
 //! that needs no more allocates nothing. Samples are read where the data set has them.
+//!
+//! Runs through sequences without missing values that are taught throughout know all of their inputs beforehand, and take the fast
+//! way. All others go step by step, see [`super::closed`]; theirs are added after.
 
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
@@ -10,11 +13,13 @@ use std::sync::{Mutex, PoisonError};
 use aligned_vec::AVec;
 use pulp::{Simd, WithSimd};
 
-use super::{Backend, Evaluation, Objective, Request, Run, Want};
+use super::closed::{self, ClosedBlock, EvaluateClosed};
+use super::{Backend, ClosedLoopTerm, Evaluation, Objective, Request, Run, Want};
 use crate::batch::{self, Block};
 use crate::dataset::{Dataset, Sequence};
 use crate::engine::{Engine, Run as _};
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::features::Features;
 use crate::forward;
 use crate::kernels::copy_few;
 use crate::likelihood::Predictions;
@@ -26,7 +31,16 @@ use crate::trajectory::{Cut, Trajectory};
 impl Backend for Engine {
     fn objective(&self, request: &Request<'_>) -> Result<Box<dyn Objective>> {
         request.data.check_for(request.topology)?;
-        Ok(Box::new(CpuObjective::new(request, self)))
+        if let Some(ClosedLoopTerm { copies, weight }) = request.closed_loop {
+            let setting = |what, found: String, needed| Err(Error::Setting { what, found, needed });
+            if !(1..=1000).contains(&copies) {
+                return setting("copies of the closed loop", copies.to_string(), "a number from 1 to 1000");
+            }
+            if !(weight >= 0.0 && weight.is_finite()) {
+                return setting("weight of the closed loop", weight.to_string(), "0 or a number above it");
+            }
+        }
+        Ok(Box::new(CpuObjective::new(request, self)?))
     }
 }
 
@@ -60,8 +74,8 @@ impl Job {
         self.block.fill(runs, own);
         self.cut = Cut::new(packed, &self.block, recompute);
         self.initial.resize(own.len() * packed.n_c, 0.0);
-        self.ln_likelihood.resize(own.len() * packed.n_x, 0.0);
-        self.squared_error.resize(own.len() * packed.n_x, 0.0);
+        self.ln_likelihood.resize(own.len() * packed.n_y, 0.0);
+        self.squared_error.resize(own.len() * packed.n_y, 0.0);
     }
 }
 
@@ -69,7 +83,21 @@ impl Job {
 #[derive(Debug)]
 struct CpuObjective {
     topology: Topology,
+    features: Features,
     data: Dataset,
+    /// Inputs and targets of taught runs: the data, but for features.
+    taught: Option<(Dataset, Dataset)>,
+    /// sum ln s, and s of each channel: what the likelihood of scaled targets differs by.
+    ln_scale: f64,
+    closed_loop: ClosedLoopTerm,
+    /// Blocks of runs that take in what they predicted; the first `closed_blocks` are in use.
+    closed: Vec<ClosedBlock>,
+    closed_blocks: usize,
+    /// Of a mixed list: which runs are taught, and which are not; their initial states; what was found of the taught ones.
+    ways: [Vec<usize>; 2],
+    some: Vec<Run>,
+    some_initial: Vec<f64>,
+    found: Option<Box<Evaluation>>,
     engine: Engine,
     recompute: bool,
     packed: Packed,
@@ -87,11 +115,23 @@ struct CpuObjective {
 }
 
 impl CpuObjective {
-    fn new(request: &Request<'_>, engine: &Engine) -> Self {
+    fn new(request: &Request<'_>, engine: &Engine) -> Result<Self> {
         let topology = request.topology;
         let packed = Packed::new(topology, engine.instruction_set());
-        Self {
+        let features = Features::new(topology);
+        let by_features = !features.are_plain() && request.data.missing() < request.data.total_samples() * packed.n_y;
+        Ok(Self {
             topology: topology.clone(),
+            ln_scale: (0..packed.n_y).map(|i| features.scale(i).ln()).sum(),
+            taught: by_features.then(|| features.taught(request.data, topology.delay())).transpose()?,
+            features,
+            closed_loop: request.closed_loop.unwrap_or(ClosedLoopTerm { copies: 0, weight: 0.0 }),
+            closed: Vec::new(),
+            closed_blocks: 0,
+            ways: [Vec::new(), Vec::new()],
+            some: Vec::new(),
+            some_initial: Vec::new(),
+            found: None,
             data: request.data.clone(),
             engine: engine.clone(),
             recompute: request.recompute,
@@ -104,7 +144,14 @@ impl CpuObjective {
             sum: AVec::new(64),
             learns: topology.per_unit(|group| group.learns_initial_state).collect(),
             packed,
-        }
+        })
+    }
+
+    /// Whether all inputs of a run are known beforehand, and its error is that of its targets in their own units.
+    fn is_taught(&self, run: &Run) -> bool {
+        let released = run.release.is_some_and(|release| self.closed_loop.copies > 0 && release.step < run.steps);
+        let simple = self.topology.has_variance() || !self.features.has_skip();
+        !released && simple && self.data.sequences()[run.sequence].missing() == 0
     }
 
     /// Whether parameters, or gradients, are of this network.
@@ -147,13 +194,18 @@ impl CpuObjective {
     }
 
     fn collect(&mut self, want: Want, evaluation: &mut Evaluation) {
-        let (n_c, n_x) = (self.packed.n_c, self.packed.n_x);
+        let (n_c, n_y) = (self.packed.n_c, self.packed.n_y);
         let jobs = &self.jobs[..self.blocks];
         for job in jobs {
             for (column, &run) in job.block.runs.iter().enumerate() {
-                let own = column * n_x..(column + 1) * n_x;
+                let own = column * n_y..(column + 1) * n_y;
                 evaluation.ln_likelihood[run] = job.ln_likelihood[own.clone()].iter().sum();
-                evaluation.squared_error[run] = job.squared_error[own].iter().sum();
+                evaluation.squared_error[run] = job.squared_error[own.clone()].iter().sum();
+                if self.features.has_skip() {
+                    evaluation.ln_likelihood[run] -= job.block.lengths[column] as f64 * self.ln_scale;
+                    let squares = job.squared_error[own].iter().enumerate();
+                    evaluation.squared_error[run] = squares.map(|(i, sum)| self.features.scale(i).powi(2) * sum).sum();
+                }
                 if want != Want::Score {
                     let out = &mut evaluation.initial[run * n_c..(run + 1) * n_c];
                     let own = &job.initial[column * n_c..(column + 1) * n_c];
@@ -193,10 +245,27 @@ impl Objective for CpuObjective {
         if !self.fits || !has_room || !self.has(runs) || initial.len() != states {
             return evaluation.fill_with_nan();
         }
+        if runs.iter().all(|run| self.is_taught(run)) {
+            return self.evaluate_taught(runs, initial, want, evaluation);
+        }
+        self.evaluate_mixed(runs, initial, want, evaluation);
+    }
+
+    fn numerics(&self) -> &str {
+        "f64"
+    }
+}
+
+impl CpuObjective {
+    /// The fast way: all inputs are known.
+    fn evaluate_taught(&mut self, runs: &[Run], initial: &[f64], want: Want, evaluation: &mut Evaluation) {
         self.plan(runs, want);
         let set = self.engine.instruction_set();
-        let (packed, floor, records) = (&self.packed, self.topology.variance_floor(), &self.records);
-        let sequences = self.data.sequences();
+        let (packed, records) = (&self.packed, &self.records);
+        let (inputs, targets) = match &self.taught {
+            Some((inputs, targets)) => (inputs.sequences(), targets.sequences()),
+            None => (self.data.sequences(), self.data.sequences()),
+        };
         self.engine.for_each(&mut self.jobs[..self.blocks], |job| {
             let lock = || records.lock().unwrap_or_else(PoisonError::into_inner);
             let record = lock().pop();
@@ -209,22 +278,103 @@ impl Objective for CpuObjective {
                 job.gradient.fill(0.0);
             }
             forward::start(packed, &job.block, initial, &mut trajectory);
-            set.run(Evaluate { packed, floor, sequences, job, trajectory: &mut trajectory, want });
+            set.run(Evaluate { packed, inputs, targets, job, trajectory: &mut trajectory, want });
             lock().push(trajectory);
         });
         self.collect(want, evaluation);
     }
 
-    fn numerics(&self) -> &str {
-        "f64"
+    /// The runs that are taught, then those that are not.
+    fn evaluate_mixed(&mut self, runs: &[Run], initial: &[f64], want: Want, evaluation: &mut Evaluation) {
+        let n_c = self.packed.n_c;
+        let [mut taught, mut others] = std::mem::take(&mut self.ways);
+        (taught.clear(), others.clear());
+        for (index, run) in runs.iter().enumerate() {
+            if self.is_taught(run) { &mut taught } else { &mut others }.push(index);
+        }
+        let mut found = self.found.take().unwrap_or_else(|| Box::new(Evaluation::new(&self.topology)));
+        let (mut some, mut some_initial) = (std::mem::take(&mut self.some), std::mem::take(&mut self.some_initial));
+        let mut take = |which: &[usize]| {
+            (some.clear(), some_initial.clear());
+            for &index in which {
+                some.push(runs[index]);
+                some_initial.extend_from_slice(&initial[index * n_c..(index + 1) * n_c]);
+            }
+            (std::mem::take(&mut some), std::mem::take(&mut some_initial))
+        };
+        evaluation.gradients.as_mut_slice().fill(0.0);
+        for (which, way) in [(&taught, true), (&others, false)] {
+            if which.is_empty() {
+                continue;
+            }
+            let (own, own_initial) = take(which);
+            found.resize(own.len());
+            match way {
+                true => self.evaluate_taught(&own, &own_initial, want, &mut found),
+                false => self.evaluate_closed(&own, &own_initial, want, &mut found),
+            }
+            for (from, &to) in which.iter().enumerate() {
+                evaluation.ln_likelihood[to] = found.ln_likelihood[from];
+                evaluation.squared_error[to] = found.squared_error[from];
+                if want != Want::Score {
+                    let own = &found.initial[from * n_c..(from + 1) * n_c];
+                    evaluation.initial[to * n_c..(to + 1) * n_c].copy_from_slice(own);
+                }
+            }
+            if want == Want::Everything {
+                let sum = evaluation.gradients.as_mut_slice().iter_mut();
+                sum.zip(found.gradients.as_slice()).for_each(|(sum, own)| *sum += own);
+            }
+            (self.some, self.some_initial) = (own, own_initial);
+        }
+        (self.ways, self.found) = ([taught, others], Some(found));
+    }
+
+    /// Step by step.
+    fn evaluate_closed(&mut self, runs: &[Run], initial: &[f64], want: Want, evaluation: &mut Evaluation) {
+        let (packed, features, term) = (&self.packed, &self.features, self.closed_loop);
+        let (blocks, used, mut order) = (&mut self.closed, &mut self.closed_blocks, std::mem::take(&mut self.order));
+        *used = 0;
+        closed::split(runs, term.copies, &mut order, |index, own| {
+            if index == blocks.len() {
+                blocks.push(ClosedBlock::new());
+            }
+            blocks[index].fill(packed, runs, own, term.copies);
+            *used = index + 1;
+        });
+        self.order = order;
+        let (set, sequences) = (self.engine.instruction_set(), self.data.sequences());
+        self.engine.for_each(&mut self.closed[..self.closed_blocks], |block| {
+            block.draw(runs, packed.n_y);
+            set.run(EvaluateClosed { packed, features, sequences, term, starts: initial, block, want });
+        });
+        let n_c = packed.n_c;
+        let blocks = &self.closed[..self.closed_blocks];
+        for block in blocks {
+            for (own, run) in block.runs().enumerate() {
+                evaluation.ln_likelihood[run] = block.ln_likelihood[own];
+                evaluation.squared_error[run] = block.squared_error[own];
+                let states = block.initial[own * n_c..(own + 1) * n_c].iter().zip(&self.learns);
+                let out = evaluation.initial[run * n_c..(run + 1) * n_c].iter_mut();
+                out.zip(states).for_each(|(out, (own, learns))| *out = if *learns { *own } else { 0.0 });
+            }
+        }
+        if want == Want::Everything {
+            self.sum.resize(packed.gradient_len(), 0.0);
+            self.sum.fill(0.0);
+            for block in blocks {
+                self.sum.iter_mut().zip(block.gradient.iter()).for_each(|(sum, own)| *sum += own);
+            }
+            packed.unpack_gradient(&self.sum, &mut evaluation.gradients);
+        }
     }
 }
 
 /// One block, forward and back.
 struct Evaluate<'a> {
     packed: &'a Packed,
-    floor: f64,
-    sequences: &'a [Sequence],
+    inputs: &'a [Sequence],
+    targets: &'a [Sequence],
     job: &'a mut Job,
     trajectory: &'a mut Trajectory,
     want: Want,
@@ -242,7 +392,7 @@ impl WithSimd for Evaluate<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { packed, floor, sequences, job, trajectory, want } = self;
+        let Self { packed, inputs, targets, job, trajectory, want } = self;
         let cut = job.cut;
         let n = job.block.columns();
         job.ln_likelihood.fill(0.0);
@@ -254,16 +404,16 @@ impl WithSimd for Evaluate<'_> {
                 let kept = &mut trajectory.span_starts[index * n * packed.rows..(index + 1) * n * packed.rows];
                 kept.copy_from_slice(&trajectory.internal[..n * packed.rows]);
             }
-            forward::enter_span(simd, packed, &job.block, sequences, span.clone(), trajectory);
+            forward::enter_span(simd, packed, &job.block, inputs, span.clone(), trajectory);
             for segment in segments(cut, &span) {
                 forward::run(simd, packed, &job.block, segment.clone(), span.start, true, trajectory);
-                score(simd, packed, floor, sequences, job, segment, trajectory);
+                score(simd, packed, targets, job, segment, trajectory);
             }
         }
         // A state that is no longer finite stays so: it must not hide behind the bounds of tanh.
         for (column, u) in trajectory.internal.chunks_exact(packed.rows).enumerate().take(n) {
             if !u[..packed.n_c].iter().all(|u| u.is_finite()) {
-                job.ln_likelihood[column * packed.n_x] = f64::NAN;
+                job.ln_likelihood[column * packed.n_y] = f64::NAN;
             }
         }
         if want == Want::Score {
@@ -276,7 +426,7 @@ impl WithSimd for Evaluate<'_> {
             if index + 1 < cut.spans() {
                 let kept = &trajectory.span_starts[index * n * packed.rows..(index + 1) * n * packed.rows];
                 trajectory.internal[..n * packed.rows].copy_from_slice(kept);
-                forward::enter_span(simd, packed, &job.block, sequences, span.clone(), trajectory);
+                forward::enter_span(simd, packed, &job.block, inputs, span.clone(), trajectory);
                 forward::run(simd, packed, &job.block, span.clone(), span.start, false, trajectory);
             }
             for segment in segments(cut, &span).rev() {
@@ -303,24 +453,23 @@ impl WithSimd for Evaluate<'_> {
 fn score<S: Simd>(
     simd: S,
     packed: &Packed,
-    floor: f64,
-    sequences: &[Sequence],
+    targets: &[Sequence],
     job: &mut Job,
     segment: Range<usize>,
     trajectory: &mut Trajectory,
 ) {
     let Job { block, ln_likelihood, squared_error, .. } = job;
-    let (n, n_x) = (block.columns(), packed.n_x);
+    let (n, n_y) = (block.columns(), packed.n_y);
     let products = segment.start.max(1)..segment.end;
     let first = products.start;
-    take_targets(packed, block, sequences, first - 1..segment.end - 1, &mut trajectory.targets);
+    take_targets(packed, block, targets, first - 1..segment.end - 1, &mut trajectory.targets);
     for (products, active) in block.stretches(products) {
         // Columns that have ended leave gaps between the steps of the others.
         let at_once = if active == n { products.len() } else { 1 };
         for product in products.step_by(at_once) {
-            let (from, target, len) = ((product - 1) * n * n_x, (product - first) * n * n_x, at_once * active * n_x);
+            let (from, target, len) = ((product - 1) * n * n_y, (product - first) * n * n_y, at_once * active * n_y);
             let variance: &mut [f64] =
-                if packed.n_out > n_x { &mut trajectory.variance[from..from + len] } else { &mut [] };
+                if packed.n_out > n_y { &mut trajectory.variance[from..from + len] } else { &mut [] };
             Predictions {
                 mean: &mut trajectory.mean[from..from + len],
                 variance,
@@ -328,10 +477,11 @@ fn score<S: Simd>(
                 terms: &mut trajectory.terms,
                 squares: &mut trajectory.squares,
                 precisions: &mut trajectory.precisions,
+                linear: packed.linear_mean,
             }
-            .score(simd, floor);
-            add_rows(&mut ln_likelihood[..active * n_x], &trajectory.terms[..len]);
-            add_rows(&mut squared_error[..active * n_x], &trajectory.squares[..len]);
+            .score(simd, packed.floor);
+            add_rows(&mut ln_likelihood[..active * n_y], &trajectory.terms[..len]);
+            add_rows(&mut squared_error[..active * n_y], &trajectory.squares[..len]);
         }
     }
 }
@@ -339,15 +489,15 @@ fn score<S: Simd>(
 /// Copies the targets of a range of steps side by side, [step][column][channel]; of columns that have ended, nothing.
 #[inline(always)]
 fn take_targets(packed: &Packed, block: &Block, sequences: &[Sequence], steps: Range<usize>, targets: &mut [f64]) {
-    let (n, n_x) = (block.columns(), packed.n_x);
+    let (n, n_y) = (block.columns(), packed.n_y);
     for (column, (&sequence, &length)) in block.sequences.iter().zip(&block.lengths).enumerate() {
         if length <= steps.start {
             break;
         }
         let own = steps.start + packed.delay..steps.end.min(length) + packed.delay;
-        let samples = &sequences[sequence].values()[own.start * n_x..own.end * n_x];
-        for (sample, targets) in samples.chunks_exact(n_x).zip(targets.chunks_exact_mut(n * n_x)) {
-            copy_few(&mut targets[column * n_x..(column + 1) * n_x], sample);
+        let samples = &sequences[sequence].values()[own.start * n_y..own.end * n_y];
+        for (sample, targets) in samples.chunks_exact(n_y).zip(targets.chunks_exact_mut(n * n_y)) {
+            copy_few(&mut targets[column * n_y..(column + 1) * n_y], sample);
         }
     }
 }
@@ -365,3 +515,7 @@ fn add_rows(sums: &mut [f64], rows: &[f64]) {
 #[cfg(test)]
 #[path = "cpu_tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "closed_tests.rs"]
+mod closed_tests;
