@@ -331,6 +331,8 @@ fn with_features(delay: usize, variance: bool) -> Vec<Network> {
     let data = crate::dataset::Dataset::new(crate::dataset::Dataset::numbered_channels(3), vec![data]).unwrap();
     let bare = network(delay, variance, fast_and_slow()).topology;
     let skip = |kind| Skip::fit(kind, &data, delay).unwrap();
+    // Taps that were fitted to these waves would let a closed loop run away.
+    let taps = (0..3 * 9).map(|k| 0.1 * (1.7 * k as f64).sin()).collect();
     let topologies = [
         bare.clone(),
         bare.clone().with_linear_mean(true),
@@ -342,7 +344,7 @@ fn with_features(delay: usize, variance: bool) -> Vec<Network> {
             .unwrap()
             .with_skip(skip(SkipKind::Extrapolation { damping: 0.7 }))
             .unwrap(),
-        bare.with_linear_mean(true).with_skip(skip(SkipKind::Autoregressive { lags: 3 })).unwrap(),
+        bare.with_linear_mean(true).with_skip(Skip::new(taps, vec![0.3, 0.2, 0.1]).unwrap()).unwrap(),
     ];
     let build = |topology: Topology| {
         let (mut network, _) = initialize(&topology, 1, 11);
@@ -378,7 +380,8 @@ fn features_and_missing_values_have_the_gradient_of_differences() {
                     regression.internal[i] = before;
                     value
                 };
-                let h = 1e-5;
+                // The likelihood is large where a loop runs away: a smaller step would drown in its last digits.
+                let h = 1e-4;
                 let slope = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
                 let near = (found - slope).abs() < 1e-6 * (1.0 + slope.abs());
                 assert!(near, "delay {delay}, kind {kind}, unit {i}: {found} instead of {slope}");

@@ -23,9 +23,10 @@ pub struct EpochReport {
     /// Epochs done so far; 0 is the initial network.
     pub epoch: u64,
     /// ln L_out in nats over all sequences (2.11); without variance units -E (A.22). In batches, each was evaluated at the parameters
-    /// that it met, but for the first report and the last.
+    /// that it met, but for the first report and the last. Where a part is learned in the closed loop, its terms are in it with their
+    /// weight, but for the last report; so they are in `nll`.
     pub ln_likelihood: f64,
-    /// -ln L_out in nats per step and channel, in the network's units; none without variance units.
+    /// -ln L_out in nats per step and channel that is not missing, in the network's units; none without variance units.
     pub nll: Option<f64>,
     /// Squared error per step and channel, in the network's units.
     pub mse: f64,
@@ -394,8 +395,12 @@ impl Learner {
         Some(divergence)
     }
 
-    /// How far the nll rose above its best, where the guard objects to it.
+    /// How far the nll rose above its best, where the guard objects to it. Closed loops, of which each epoch has others, may be off by
+    /// any amount in one of them: there it does not.
     fn rise(&self) -> Option<f64> {
+        if self.plan.closed_loop.is_some() {
+            return None;
+        }
         self.guard.as_ref()?.rise(self.batches.ln_likelihood(), self.terms)
     }
 

@@ -270,7 +270,7 @@ impl EvaluateClosed<'_> {
             self.block.internal[run * rows..][..n_c].copy_from_slice(&self.starts[from..from + n_c]);
         }
         activate(simd, packed, &self.block.internal, &mut self.block.states, self.block.runs);
-        let (mut guess, padded_out) = (vec![0.0; n], padded(packed.n_out));
+        let padded_out = padded(packed.n_out);
         for k in 0..self.block.steps {
             let running = self.block.running(k);
             let before = if k == 0 { self.block.runs } else { self.block.running(k - 1) };
@@ -315,9 +315,14 @@ impl EvaluateClosed<'_> {
             for column in 0..running {
                 let at = (k * count + column) * n;
                 let block = &mut *self.block;
-                features.guess(|back| &block.record.x[block.place(column, k.saturating_sub(back)) * n..][..n], &mut guess);
+                let Column { start, from, .. } = block.columns[column];
+                let Record { x, mean, .. } = &mut block.record;
+                let place = |step: usize| step * count + if step < start { from } else { column };
+                let mean = &mut mean[at..at + n];
+                features.guess(|back| &x[place(k.saturating_sub(back)) * n..][..n], mean);
                 for i in 0..n {
-                    block.record.mean[at + i] = features.mean(i, guess[i], block.record.rho[at + i]);
+                    let guess = block.record.mean[at + i];
+                    block.record.mean[at + i] = features.mean(i, guess, block.record.rho[at + i]);
                     block.record.variance[at + i] = features.variance(i, block.record.exp_u[at + i]);
                 }
             }
