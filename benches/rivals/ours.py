@@ -18,26 +18,7 @@ from method import Method
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 
-# The seam.
-#
-# 1. RECIPE is what stands in the experiment file besides its data. Once there is `[training] recipe = "auto"` it is that one line;
-#    until then it is README's first example of own data.
-# 2. Once there is `scrnn evaluate RUN DATA --json`, `one_step`, `ahead`, `complete` and `recognise` become readings of its object.
-#    Until then they are made of `generate` and `recognize`: the network listens in the open loop, its state is taken from
-#    `--contexts` (u = artanh c), and closed loops start there.
-# 3. Once there is `training.members`, ScrnnMembers is a line of the experiment; until then it trains four and mixes them here.
-
-RECIPE = """
-[[network.groups]]
-name = "context"
-units = 20
-time_constant = 3.0
-
-[training]
-epochs = {epochs}
-optimiser = "adam"
-"""
-EPOCHS = 5000
+# Nothing is chosen here: `scrnn train FILE` writes the experiment that it takes, as it would for anybody. One thread, for the time.
 
 
 def program():
@@ -70,68 +51,58 @@ def read(path, field):
 class Scrnn(Method):
     """One network for all labels, told neither label nor length."""
 
-    copies_ahead = 30
+    copies_ahead = 10
+    options = ()
 
     def fit(self, task, seed, quick):
         self.task, self.seed = task, seed
         self.folder = tempfile.TemporaryDirectory(prefix="rivals-")
         self.at = pathlib.Path(self.folder.name)
         write(self.at / "learned.npz", task.part(task.learned)[0])
-        head = f'name = "rivals"\nseed = {seed}\n\n[data]\nfiles = ["learned.npz"]\n'
-        (self.at / "experiment.toml").write_text(head + RECIPE.format(epochs=EPOCHS // 25 if quick else EPOCHS))
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        self.result = json.loads(scrnn("train", self.at / "experiment.toml", "--out", self.at / "run", "--json"))
+        shorter = ("--set", "training.epochs=100") if quick else ()
+        arguments = ("train", self.at / "learned.npz", "--out", self.at / "run", "--seed", seed, "--json", *self.options, *shorter)
+        self.result = json.loads(scrnn(*arguments))
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         self.seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
     def generate(self, name, sequences, *arguments):
+        """Means, variances and samples; the network hears the sequences, then itself."""
         write(self.at / f"{name}.npz", sequences)
         out = self.at / f"{name}-generated.npz"
-        scrnn("generate", self.at / "run", "--data", self.at / f"{name}.npz", "--out", out, *arguments)
+        told = ("--mode", "open", "--mean", "--seed", self.seed, *arguments)
+        scrnn("generate", self.at / "run", "--data", self.at / f"{name}.npz", "--out", out, *told)
         return functools.partial(read, out)
 
-    def listened(self, sequences):
-        """Mean, variance and internal state after each sample, from the mean initial state."""
-        got = self.generate("open", sequences, "--mode", "open", "--mean", "--contexts")
-        states = [np.arctanh(np.clip(c, -1 + 1e-15, 1 - 1e-15)) for c in got("context")]
-        return got("mean"), got("variance"), states
-
-    def closed(self, starts, states, steps, copies):
-        """Closed loops that have heard `states` and now hear the one sample of `starts`: starts x copies x steps x channels."""
-        np.savez(self.at / "states.npz", states=np.array(states))
-        padded = [np.repeat(x[None], 3, axis=0) for x in starts]
-        got = self.generate(
-            "closed", padded, "--mode", "closed", "--initial-state", self.at / "states.npz",
-            "--steps", steps, "--samples", copies, "--seed", self.seed,
-        )
-        shape = lambda parts: np.array(parts).reshape(len(starts), copies, steps, -1)  # noqa: E731
-        return shape(got("mean")), shape(got("variance")), shape(got("sample"))
-
     def one_step(self, sequences, labels):
-        means, variances, _ = self.listened(sequences)
+        got = self.generate("open", sequences)
         out = []
-        for s, m, v in zip(sequences, means, variances, strict=True):
+        for s, m, v in zip(sequences, got("mean"), got("variance"), strict=True):
             rows = np.full_like(s, np.nan), np.full_like(s, np.nan)
             rows[0][1:], rows[1][1:] = m[: len(s) - 1], v[: len(s) - 1]
             out.append(rows)
         return out
 
     def ahead(self, sequences, labels, steps):
-        _, _, states = self.listened(sequences)
         out = []
-        for s, u in zip(sequences, states, strict=True):
+        for s in sequences:
             mean, variance = np.full_like(s, np.nan), np.full_like(s, np.nan)
             times = list(range(measures.BURN_IN, len(s) - steps + 1, 5))
-            m, v, _ = self.closed([s[t - 1] for t in times], [u[t - 2] for t in times], steps, self.copies_ahead)
+            longest = times[-1] - 1 + steps
+            got = self.generate("ahead", [s[:t] for t in times], "--steps", longest, "--samples", self.copies_ahead)
+            m, v = (np.array(got(field)).reshape(len(times), self.copies_ahead, longest, -1) for field in ("mean", "variance"))
             for k, t in enumerate(times):
-                mean[t + steps - 1], variance[t + steps - 1] = measures.moments(m[k, :, -1], v[k, :, -1])
+                # Row 0 predicts the second sample.
+                row = t + steps - 2
+                mean[t + steps - 1], variance[t + steps - 1] = measures.moments(m[k, :, row], v[k, :, row])
             out.append((mean, variance))
         return out
 
     def rolled(self, observed, steps, copies):
-        _, _, states = self.listened([observed])
-        m, v, samples = self.closed([observed[-1]], [states[0][len(observed) - 2]], steps, copies)
-        return m[0], v[0], samples[0]
+        """Copies of what follows `observed`: means, variances and samples."""
+        heard = len(observed) - 1
+        got = self.generate("rolled", [observed], "--steps", heard + steps, "--samples", copies)
+        return tuple(np.array(got(field))[:, heard:] for field in ("mean", "variance", "sample"))
 
     def complete(self, observed, length, label, copies, rng):
         means, variances, samples = self.rolled(observed, length - len(observed), copies)
@@ -146,7 +117,8 @@ class Scrnn(Method):
         write(self.at / "recognise.npz", sequences)
         found = json.loads(scrnn("recognize", self.at / "run", self.at / "recognise.npz", "--json"))
         labels = self.task.part(self.task.learned)[1]
-        return [labels[one["learned"][0]["number"] - 1] for one in (found if isinstance(found, list) else found["sequences"])]
+        found = found if isinstance(found, list) else found["sequences"]
+        return [labels[one["learned"][0]["number"] - 1] for one in found]
 
     def notes(self):
         return {"seconds_of_training": self.seconds, "train": self.result}

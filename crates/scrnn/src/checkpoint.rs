@@ -428,7 +428,8 @@ impl Record {
         let groups = self.topology.groups.clone();
         let TopologyRecord { delay, linear_mean, velocity_inputs, skip, .. } = &self.topology;
         let built = || {
-            let mut topology = Topology::new(self.channels.len(), *delay, groups, prediction)?.with_linear_mean(*linear_mean);
+            let mut topology =
+                Topology::new(self.channels.len(), *delay, groups, prediction)?.with_linear_mean(*linear_mean);
             if let Some(deviations) = velocity_inputs {
                 topology = topology.with_velocity_inputs(deviations.clone())?;
             }

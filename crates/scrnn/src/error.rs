@@ -44,7 +44,9 @@ pub enum Error {
     NoSequences,
 
     /// A sample that is infinite.
-    #[error("sequence {sequence}, step {step}, channel {channel} is {value}; needed: a finite number, or NaN for a missing value")]
+    #[error(
+        "sequence {sequence}, step {step}, channel {channel} is {value}; needed: a finite number, or NaN for a missing value"
+    )]
     NotFinite {
         /// Index of the sequence, from 0.
         sequence: usize,

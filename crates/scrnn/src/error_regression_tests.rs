@@ -409,7 +409,8 @@ fn with_features_and_missing_values_it_forecasts_what_generation_gives() {
             }
             let sensed: Vec<f64> = (0..count).flat_map(gapped).collect();
             let steps = count - delay + 1 + ahead;
-            let options = GenerationOptions { steps, feedback: Feedback::mixed(3, 1.0, false), seed: 1, contexts: false };
+            let options =
+                GenerationOptions { steps, feedback: Feedback::mixed(3, 1.0, false), seed: 1, contexts: false };
             let start = Start { initial_state: &u0(network), sensed: &sensed };
             let generated = generate(network, &[start], &options, &Engine::serial()).unwrap();
             for step in 0..=ahead {

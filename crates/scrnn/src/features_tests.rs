@@ -32,7 +32,8 @@ fn two_steps_ahead_a_line_goes_twice_as_far() {
 #[cfg(feature = "analysis")]
 #[test]
 fn what_the_fitted_taps_leave_over_has_nothing_of_the_differences_left() {
-    let wave: Vec<f64> = (0..60).map(|t| (0.3 * f64::from(t)).sin() + 0.3 * (1.1 * f64::from(t * t % 17)).cos()).collect();
+    let wave: Vec<f64> =
+        (0..60).map(|t| (0.3 * f64::from(t)).sin() + 0.3 * (1.1 * f64::from(t * t % 17)).cos()).collect();
     let skip = Skip::fit(SkipKind::Autoregressive { lags: 2 }, &data(&[&wave]), 1).unwrap();
     let d = |k: usize, lag: usize| if k > lag { wave[k - lag] - wave[k - lag - 1] } else { 0.0 };
     let left = |k: usize| wave[k + 1] - wave[k] - skip.taps()[0] * d(k, 0) - skip.taps()[1] * d(k, 1);

@@ -33,7 +33,8 @@ pub fn plain(network: &Network, u0: &[f64], samples: &[f64], steps: usize) -> (f
     let (mut ln_likelihood, mut squared_error) = (0.0, 0.0);
     for k in 0..steps {
         state.step(&samples[k * n_x..(k + 1) * n_x]);
-        for (i, target) in samples[(k + delay) * n_x..][..n_x].iter().enumerate().filter(|(_, target)| !target.is_nan()) {
+        for (i, target) in samples[(k + delay) * n_x..][..n_x].iter().enumerate().filter(|(_, target)| !target.is_nan())
+        {
             let squared = (target - state.y[i]).powi(2);
             squared_error += squared;
             ln_likelihood += match state.v.get(i) {

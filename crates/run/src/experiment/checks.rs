@@ -3,8 +3,8 @@
 use crate::memory::{complaint as complaint_about, product};
 
 use super::{
-    Adam, ClosedLoop, Data, Experiment, Lbfgs, Momentum, Network, OptimiserName, Output, ScalingChoice, SkipName, TaskName,
-    Training,
+    Adam, ClosedLoop, Data, Experiment, Lbfgs, Momentum, Network, OptimiserName, Output, ScalingChoice, SkipName,
+    TaskName, Training,
 };
 
 /// Most sequences and steps that a task is asked for, most units of a group, and the longest delay.
@@ -58,7 +58,12 @@ pub fn check(experiment: &Experiment) -> Check {
     of_library(closed_loop.as_ref().map_or(Ok(()), ClosedLoop::check))?;
     if *optimiser == OptimiserName::Momentum {
         let path = ["network", "initial_state_variance"];
-        must(experiment.network.initial_state_variance > 0.0, &path, 0, "a number above 0 with momentum; 0 needs adam")?;
+        must(
+            experiment.network.initial_state_variance > 0.0,
+            &path,
+            0,
+            "a number above 0 with momentum; 0 needs adam",
+        )?;
         let path = ["training", "closed_loop"];
         must(closed_loop.is_none(), &path, "given with momentum", "optimiser = \"adam\"")?;
     }

@@ -9,8 +9,8 @@ use scrnn::scaling::Scaling;
 use scrnn::topology::{Prediction, Topology};
 
 use super::{
-    Data, Experiment, MeanUnits, OptimiserName, ScalingChoice, ScalingConstants, ScalingName, ScalingRanges, SkipName, TaskName,
-    TimeSourceName, Training,
+    Data, Experiment, MeanUnits, OptimiserName, ScalingChoice, ScalingConstants, ScalingName, ScalingRanges, SkipName,
+    TaskName, TimeSourceName, Training,
 };
 use crate::failure::{Failure, Result};
 use scrnn_data::{Selection, TimeSource};
@@ -39,7 +39,8 @@ impl Experiment {
     /// are fitted to them.
     pub fn topology(&self, data: &Dataset) -> Result<Topology> {
         let network = &self.network;
-        let mut topology = self.bare_topology(data.channels().len())?.with_linear_mean(network.mean == MeanUnits::Linear);
+        let mut topology =
+            self.bare_topology(data.channels().len())?.with_linear_mean(network.mean == MeanUnits::Linear);
         if network.velocity_inputs {
             topology = topology.with_velocity_inputs(velocity_deviations(data))?;
         }
@@ -169,7 +170,8 @@ const REACH: f64 = 1e150;
 fn check_reach(data: &Dataset, scaling: &Scaling) -> Result<()> {
     for (i, name) in data.channels().iter().enumerate() {
         let samples = || data.sequences().iter().flat_map(|s| s.values().iter().skip(i).step_by(data.channels().len()));
-        let largest = samples().filter(|value| !value.is_nan()).fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        let largest =
+            samples().filter(|value| !value.is_nan()).fold(0.0_f64, |largest, value| largest.max(value.abs()));
         let scale = scaling.scale()[i].abs();
         let help = "bring the data to other units, or leave the channel out with `channels` in [data]";
         if largest > REACH {

@@ -16,8 +16,8 @@ use super::adam::{self, AdamRule};
 use super::plan::ClosedLoop;
 use super::state::Fields;
 use super::state::{OptimiserState, StateTensor};
-use crate::error::Result;
 use crate::dataset::Dataset;
+use crate::error::Result;
 use crate::initial_states::InitialStates;
 use crate::objective::{Evaluation, Objective, Release, Run, Want};
 use crate::parameters::{Gradients, Parameters};
@@ -379,7 +379,12 @@ mod tests {
                     assert!(met[run.sequence].is_nan());
                     met[run.sequence] = single.ln_likelihoods[run.sequence];
                 }
-                let batch = adam::Batch { epoch, update: 4 * epoch + nth as u64 + 1, runs, terms: terms(runs, &single.targets) };
+                let batch = adam::Batch {
+                    epoch,
+                    update: 4 * epoch + nth as u64 + 1,
+                    runs,
+                    terms: terms(runs, &single.targets),
+                };
                 rule.ascend(&batch, &single.evaluation, &mut by_hand.parameters, &mut own_states);
             }
             rule.end_epoch(&mut own_states);

@@ -98,7 +98,12 @@ fn place(network: &Network, u0: &[f64], data: &Dataset, s: usize) -> (Option<usi
             return (Some(step), "variance");
         }
         let target = sequence.sample(step + delay);
-        if state.v.iter().enumerate().any(|(i, &v)| !target[i].is_nan() && !ln_gaussian(target[i], state.y[i], v).is_finite()) {
+        if state
+            .v
+            .iter()
+            .enumerate()
+            .any(|(i, &v)| !target[i].is_nan() && !ln_gaussian(target[i], state.y[i], v).is_finite())
+        {
             return (Some(step), "log-likelihood");
         }
     }

@@ -41,13 +41,7 @@ pub(super) struct MomentumRule {
 }
 
 impl MomentumRule {
-    pub fn new(
-        options: Momentum,
-        topology: &Topology,
-        states: &InitialStates,
-        terms: f64,
-        variance: f64,
-    ) -> Self {
+    pub fn new(options: Momentum, topology: &Topology, states: &InitialStates, terms: f64, variance: f64) -> Self {
         let n_o = topology.channels() as f64;
         Self {
             rates: (options.rate / terms, options.rate / n_o),

@@ -358,10 +358,14 @@ fn settings_out_of_range_are_refused_by_name() {
     assert!(refuse(Plan { initial_state_variance: -1.0, ..Plan::default() }).contains("initial_state_variance is -1"));
     let shared = Plan { initial_state_variance: 0.0, ..Plan::default() };
     assert!(refuse(shared).contains("initial_state_variance (with momentum) is 0"));
-    let closed = |change: &dyn Fn(&mut ClosedLoop)| refuse(Plan { closed_loop: Some(ClosedLoop::with(|it| change(it))), ..adam(1) });
+    let closed = |change: &dyn Fn(&mut ClosedLoop)| {
+        refuse(Plan { closed_loop: Some(ClosedLoop::with(|it| change(it))), ..adam(1) })
+    };
     assert!(closed(&|it| it.copies = 0).contains("closed_loop.copies is 0"));
     assert!(closed(&|it| it.taught = 1.5).contains("closed_loop.taught is 1.5"));
-    assert!(closed(&|it| it.latest = 0.01).contains("closed_loop.latest is 0.01; needed: at least closed_loop.earliest"));
+    assert!(
+        closed(&|it| it.latest = 0.01).contains("closed_loop.latest is 0.01; needed: at least closed_loop.earliest")
+    );
     let by_momentum = Plan { closed_loop: Some(ClosedLoop::default()), ..Plan::default() };
     assert!(refuse(by_momentum).contains("closed_loop (with momentum)"));
     assert!(refuse(momentum(1, Momentum { momentum: 1.0, ..Momentum::default() })).contains("momentum.momentum is 1"));

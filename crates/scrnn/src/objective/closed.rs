@@ -405,7 +405,10 @@ impl EvaluateClosed<'_> {
                     let within = ks.clone().map(|column| record.variance[own(column)]).sum::<f64>() / many;
                     let between = match ks.len() {
                         1 => 0.0,
-                        _ => ks.clone().map(|column| (record.mean[own(column)] - mean).powi(2)).sum::<f64>() / (many - 1.0),
+                        _ => {
+                            ks.clone().map(|column| (record.mean[own(column)] - mean).powi(2)).sum::<f64>()
+                                / (many - 1.0)
+                        }
                     };
                     let variance = within + between;
                     let (a, b) = (e / variance, 0.5 * (e * e / variance - 1.0) / variance);
@@ -489,7 +492,9 @@ impl EvaluateClosed<'_> {
                         gx[i] += gm[i];
                     }
                     let columns = &block.columns;
-                    let place = |step: usize| step * count + if step < columns[column].start { columns[column].from } else { column };
+                    let place = |step: usize| {
+                        step * count + if step < columns[column].start { columns[column].from } else { column }
+                    };
                     for lag in (0..features.lags()).take_while(|lag| *lag < k) {
                         let own = place(k - 1 - lag) * n;
                         features.back(lag, &gm[at..at + n], &mut gd[own..own + n]);
@@ -523,7 +528,8 @@ impl EvaluateClosed<'_> {
             }
             for column in 0..running {
                 // What begins here was a copy of its run.
-                let to = (k - 1) * count + if block.columns[column].start == k { block.columns[column].from } else { column };
+                let to = (k - 1) * count
+                    + if block.columns[column].start == k { block.columns[column].from } else { column };
                 let to = &mut block.deltas[to * stride..][..n_c];
                 for (to, own) in to.iter_mut().zip(&block.outputs[column * stride..][..n_c]) {
                     *to += own;
@@ -553,8 +559,10 @@ impl EvaluateClosed<'_> {
                 true => Taken::from((end - first) * count),
                 false => Taken { groups: end - first, width, period: count },
             };
-            let deltas = Rows { values: &block.deltas[first * count * packed.delta_stride..], stride: packed.delta_stride };
-            let states = Rows { values: &block.states[first * count * packed.state_stride..], stride: packed.state_stride };
+            let deltas =
+                Rows { values: &block.deltas[first * count * packed.delta_stride..], stride: packed.delta_stride };
+            let states =
+                Rows { values: &block.states[first * count * packed.state_stride..], stride: packed.state_stride };
             accumulate(simd, deltas, states, taken, packed.rows, (0, packed.n_c), context);
             let inputs = (packed.rows, packed.rows + packed.n_x + 1);
             accumulate(simd, deltas, states, taken, packed.rows, inputs, input);

@@ -150,8 +150,7 @@ fn values_are_those_of_plain_loops() {
             for (missing, term) in [false, true].into_iter().flat_map(|missing| terms.map(|term| (missing, term))) {
                 let (data, (network, states)) = (data(missing), network(&topology));
                 let runs = runs(&data, delay, term);
-                let found =
-                    evaluate(&request(&topology, &data, term), &network, &runs, &states, &Engine::serial());
+                let found = evaluate(&request(&topology, &data, term), &network, &runs, &states, &Engine::serial());
                 for (index, run) in runs.iter().enumerate() {
                     let (samples, u0) = (data.sequences()[index].values(), &states[index * 7..(index + 1) * 7]);
                     let expected = match (run.release, term) {
@@ -233,9 +232,15 @@ fn a_whole_sequence_gives_the_same_step_by_step() {
         sequences[2] = Sequence::new("s2", 2, values).unwrap();
         let gapped = Dataset::new(whole.channels().to_vec(), sequences).unwrap();
         let shorter = |data: &Dataset| Run::new(2, data.sequences()[2].len() - 2);
-        let fast = evaluate(&Request::new(&topology, &whole), &network, &[shorter(&whole)], &states[14..], &Engine::serial());
-        let slow =
-            evaluate(&Request::new(&topology, &gapped), &network, &[shorter(&gapped)], &states[14..], &Engine::serial());
+        let fast =
+            evaluate(&Request::new(&topology, &whole), &network, &[shorter(&whole)], &states[14..], &Engine::serial());
+        let slow = evaluate(
+            &Request::new(&topology, &gapped),
+            &network,
+            &[shorter(&gapped)],
+            &states[14..],
+            &Engine::serial(),
+        );
         near(name, slow.ln_likelihood[0], fast.ln_likelihood[0], 1e-12);
         for (slow, fast) in slow.gradients.as_slice().iter().zip(fast.gradients.as_slice()) {
             near(name, *slow, *fast, 1e-11);
