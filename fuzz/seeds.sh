@@ -10,6 +10,9 @@ for kind in csv tsv txt; do "$scrnn" data lissajous --sequences 2 --steps 4 --ou
 rm -f corpus/*/*.truth.*
 printf 'sequence;step;y 1;"y ""2"""\na;1;0,5;2\na;2;1;3\n\nb;1;nan;-1e9\n' > corpus/table/semicolons
 printf '# columns: a b\n# sequence: x\n1 2\n3 4\n\n# sequence: y\n5 inf\n' > corpus/table/comments
+printf '1\t1\t2\t3\t4\t5\t6\t7\t8\t9\t9.5\n2\t-5\t-4\t-3\t-2\t-1\t0\t1\t2\t3\t4\n1\t9\t8\t7\t6\t5\t4\t3\t2\t1\tNaN\n2\t0\t0\t1\t1\t2\t2\t3\t3\t4\t4\n' > corpus/table/classes
+printf 'Trajectories\n100\n,,A:hip,,,A:knee\nFrame,Sub Frame,X,Y,Z,X,Y,Z\n,,mm,mm,mm,mm,mm,mm\n1,0,1,2,3,4,5,6\n2,0,1,2,3,4,5,6\n' > corpus/table/vicon
+printf 'FREQUENCY\t50\nDATA_INCLUDED\t3D\nMARKER_NAMES\thip\tknee\n1.5\t2\t3\t4\t5\t6\n1.5\t2\t3\t4\t5\t6\n' > corpus/table/qualisys
 "$scrnn" data lissajous --sequences 2 --steps 4 --out corpus/npy/x.npy -q
 "$scrnn" data lissajous --sequences 2 --steps 4 --out corpus/npz/x.npz -q
 rm -f corpus/*/*.truth.*

@@ -17,7 +17,7 @@ use crate::natural::natural;
 use crate::reading::Topic;
 use crate::remark::Remark;
 use crate::samples::{Samples, Track};
-use crate::{ArrayProblem, Axes, FileError, Selection, times};
+use crate::{ArrayProblem, Axes, FileError, Selection, npz, times};
 
 /// Numbers with a shape. NaN is missing.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -70,6 +70,10 @@ const CLOCKS: &[&str] = &[
     "timestamp_s",
     "frame_times",
 ];
+
+/// Names of texts that are the names of sequences, and of channels.
+const SEQUENCE_NAMES: &[&str] = &[npz::SEQUENCES, "sequence_names", "episode_names", "demo_names"];
+const CHANNEL_NAMES: &[&str] = &[npz::CHANNELS, "channel_names", "joint_names"];
 
 /// Sequences of arrays.
 ///
@@ -136,7 +140,8 @@ pub fn to_samples(
             }),
         }
     }
-    let unused = |texts: &&Texts| texts.texts != samples.channels;
+    let named = names(&mut samples, texts);
+    let unused = |texts: &&Texts| texts.texts != samples.channels && !named.contains(&texts.name.as_str());
     remarks.extend(
         texts
             .iter()
@@ -364,7 +369,10 @@ fn alone(
     } else {
         tracks.map(|(s, values)| ((s + 1).to_string(), values.to_vec())).collect()
     };
-    let mut fitting = texts.iter().filter(|texts| texts.texts.len() == channels && distinct(&texts.texts));
+    let of_sequences = |texts: &Texts| SEQUENCE_NAMES.contains(&texts.name.to_lowercase().as_str());
+    let mut fitting = texts
+        .iter()
+        .filter(|texts| texts.texts.len() == channels && distinct(&texts.texts) && !of_sequences(texts));
     Ok(match (fitting.next(), fitting.next()) {
         (Some(names), None) if channels > 1 || names.name.to_lowercase().contains("name") => {
             remarks.push(Remark::Understood { what: format!("the channels' names are those in `{}`", names.name) });
@@ -372,6 +380,23 @@ fn alone(
         }
         _ => Samples::numbered(channels, tracks),
     })
+}
+
+/// Names that an archive tells by what they are called. Returns those that were taken.
+fn names<'a>(samples: &mut Samples, texts: &'a [Texts]) -> Vec<&'a str> {
+    let mut taken = Vec::new();
+    for Texts { name, texts } in texts.iter().filter(|texts| distinct(&texts.texts)) {
+        let is = |names: &[&str]| names.contains(&name.to_lowercase().as_str());
+        if texts.len() == samples.tracks.len() && is(SEQUENCE_NAMES) {
+            samples.tracks.iter_mut().zip(texts).for_each(|(track, name)| track.name.clone_from(name));
+            taken.push(name.as_str());
+        } else if texts.len() == samples.channels.len() && !samples.facts.named && is(CHANNEL_NAMES) {
+            samples.channels.clone_from(texts);
+            samples.facts.named = true;
+            taken.push(name.as_str());
+        }
+    }
+    taken
 }
 
 fn distinct(texts: &[String]) -> bool {

@@ -57,14 +57,21 @@ fn join(mut readings: Vec<(&Path, Reading)>, any_period: bool) -> Result<Reading
             });
         }
         for sequence in reading.data.sequences() {
-            let rows = sequence.values().chunks_exact(channels.len());
-            let values = match &columns {
-                Some(columns) => rows.flat_map(|row| columns.iter().map(|&column| row[column])).collect(),
-                None => sequence.values().to_vec(),
-            };
             let name = format!("{stem}/{}", sequence.name);
-            let sequence = Sequence::new(name, channels.len(), values);
-            sequences.push(sequence.map_err(|source| FileError::Data { path: path.display().to_string(), source })?);
+            sequences.push(match &columns {
+                None => {
+                    // A clone shares the samples.
+                    let mut sequence = sequence.clone();
+                    sequence.name = name;
+                    sequence
+                }
+                Some(columns) => {
+                    let rows = sequence.values().chunks_exact(channels.len());
+                    let values = rows.flat_map(|row| columns.iter().map(|&column| row[column])).collect();
+                    let sequence = Sequence::new(name, channels.len(), values);
+                    sequence.map_err(|source| FileError::Data { path: path.display().to_string(), source })?
+                }
+            });
         }
         for remark in &reading.remarks {
             if !remarks.contains(remark) {

@@ -38,6 +38,21 @@ fn good_files_are_read_in_a_small_multiple_of_their_size() {
 }
 
 #[test]
+fn a_set_of_many_episodes_is_held_once_and_a_part_of_it_twice() {
+    let episode = |e: usize| {
+        let values = (0..20_000).map(|k| ((e * k) as f64 * 0.37).sin()).collect();
+        Sequence::new(e.to_string(), 10, values).unwrap()
+    };
+    let data = Dataset::new(Dataset::numbered_channels(10), (0..40).map(episode).collect()).unwrap();
+    let files = lerobot::write::files("x", &data, Some(0.02), "move").unwrap();
+    let (_, frames) = files.into_iter().find(|(place, _)| place.starts_with("data/")).unwrap();
+    let decoded = (data.total_samples() * 10 * size_of::<f64>()) as u64;
+    // Beside the samples: numbers of the frames, the clock, and one episode as it is read.
+    let held = held("x.parquet", &frames);
+    assert!(held < FREE + decoded * 3 / 2, "{held} for {decoded}");
+}
+
+#[test]
 fn promises_of_terabytes_cost_nothing() {
     let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000, 100000, 1), }\n";
     let mut npy = b"\x93NUMPY\x01\x00".to_vec();

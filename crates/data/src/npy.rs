@@ -116,8 +116,27 @@ pub fn file_error(file: &str, path: &str, refused: Refused) -> FileError {
 
 /// An array of float64, as numpy.save writes it.
 pub fn array_bytes(shape: &[usize], values: impl Iterator<Item = f64>) -> Vec<u8> {
-    let lengths: Vec<String> = shape.iter().map(usize::to_string).collect();
-    let mut header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}), }}", lengths.join(", "));
+    let mut bytes = beginning("<f8", shape);
+    bytes.extend(values.flat_map(f64::to_le_bytes));
+    bytes
+}
+
+/// The bytes of an array of texts, as wide as the longest.
+pub fn text_bytes(texts: &[String]) -> Vec<u8> {
+    let width = texts.iter().map(|text| text.chars().count()).max().unwrap_or(0).max(1);
+    let mut bytes = beginning(&format!("<U{width}"), &[texts.len()]);
+    for text in texts {
+        let letters = text.chars().map(u32::from).chain(std::iter::repeat(0));
+        bytes.extend(letters.take(width).flat_map(u32::to_le_bytes));
+    }
+    bytes
+}
+
+/// Magic, version and header.
+fn beginning(kind: &str, shape: &[usize]) -> Vec<u8> {
+    let lengths: String = shape.iter().map(|length| format!("{length}, ")).collect();
+    let lengths = if shape.len() == 1 { lengths.trim_end() } else { lengths.trim_end_matches(", ") };
+    let mut header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({lengths}), }}");
     let unpadded = MAGIC.len() + 4 + header.len() + 1;
     header.push_str(&" ".repeat(unpadded.next_multiple_of(64) - unpadded));
     header.push('\n');
@@ -126,7 +145,6 @@ pub fn array_bytes(shape: &[usize], values: impl Iterator<Item = f64>) -> Vec<u8
     // Three lengths of twenty digits are far from 65535.
     bytes.extend((header.len() as u16).to_le_bytes());
     bytes.extend(header.as_bytes());
-    bytes.extend(values.flat_map(f64::to_le_bytes));
     bytes
 }
 

@@ -10,7 +10,9 @@ use zip::result::ZipError;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
-use super::npy::{Contents, array_bytes, file_error, parse};
+use scrnn::dataset::Dataset;
+
+use super::npy::{Contents, array_bytes, file_error, parse, text_bytes};
 use crate::arrays::{Texts, to_samples};
 use crate::excerpt::shortened;
 use crate::remark::Remark;
@@ -86,12 +88,28 @@ pub fn read(source: &Source<'_>, selection: &Selection) -> Result<Samples, FileE
     Ok(samples)
 }
 
-/// The bytes of an archive with one array for each sequence of each field: `sequence_000`, ..., `mean_000`, ...
+/// What the array is called that holds the names of the sequences.
+pub const SEQUENCES: &str = "names_of_sequences";
+/// What the array is called that holds the names of the channels; of a field with channels of its own: and its name.
+pub const CHANNELS: &str = "names_of_channels";
+/// Most bytes of an array of names: texts are as wide as the longest.
+const LONGEST_NAMES: usize = 1 << 24;
+
+/// The bytes of an archive with one array for each sequence of each field: `sequence_000`, ..., `mean_000`, ...; and with the
+/// names of sequences and channels.
 ///
 /// The same data give the same bytes: there is no compression, and no time of day.
 pub fn write(path: &str, fields: &[Field<'_>]) -> Result<Vec<u8>, FileError> {
     let pack = || -> Result<Vec<u8>, ZipError> {
         let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+        let mut member = |name: &str, bytes: &[u8]| {
+            let options = SimpleFileOptions::default()
+                .compression_method(CompressionMethod::Stored)
+                .last_modified_time(DateTime::default())
+                .large_file(u32::try_from(bytes.len()).is_err());
+            archive.start_file(format!("{name}.npy"), options)?;
+            archive.write_all(bytes).map_err(ZipError::Io)
+        };
         for field in fields {
             let stem = if field.name.is_empty() { "sequence" } else { field.name };
             let count = field.data.sequences().len();
@@ -99,15 +117,35 @@ pub fn write(path: &str, fields: &[Field<'_>]) -> Result<Vec<u8>, FileError> {
             for (index, sequence) in field.data.sequences().iter().enumerate() {
                 let shape = [sequence.len(), field.data.channels().len()];
                 let bytes = array_bytes(&shape, sequence.values().iter().copied());
-                let options = SimpleFileOptions::default()
-                    .compression_method(CompressionMethod::Stored)
-                    .last_modified_time(DateTime::default())
-                    .large_file(u32::try_from(bytes.len()).is_err());
-                archive.start_file(format!("{stem}_{index:0digits$}.npy"), options)?;
-                archive.write_all(&bytes)?;
+                member(&format!("{stem}_{index:0digits$}"), &bytes)?;
             }
+        }
+        for (name, texts) in names(fields) {
+            member(&name, &text_bytes(&texts))?;
         }
         Ok(archive.finish()?.into_inner())
     };
     pack().map_err(|source| FileError::Archive { path: path.to_owned(), source })
+}
+
+/// Arrays of names, with what they are called.
+fn names(fields: &[Field<'_>]) -> Vec<(String, Vec<String>)> {
+    let Some(first) = fields.first() else { return Vec::new() };
+    let sequences = first.data.sequences().iter().map(|sequence| sequence.name.clone()).collect();
+    let mut all: Vec<(String, Vec<String>)> = vec![(SEQUENCES.to_owned(), sequences)];
+    for field in fields {
+        let channels = field.data.channels();
+        let named = channels != Dataset::numbered_channels(channels.len());
+        if named && all.iter().skip(1).all(|(_, others)| others != channels) {
+            let own = if all.len() == 1 { String::new() } else { format!("_{}", field.name) };
+            all.push((format!("{CHANNELS}{own}"), channels.to_vec()));
+        }
+    }
+    // Numpy drops zeros at the end of a text, and nobody is told by a name that is not there.
+    let fits = |texts: &Vec<String>| {
+        let longest = texts.iter().map(|text| text.chars().count()).max().unwrap_or(0);
+        longest > 0 && longest.saturating_mul(4).saturating_mul(texts.len()) <= LONGEST_NAMES
+    };
+    all.retain(|(_, texts)| fits(texts));
+    all
 }

@@ -147,6 +147,12 @@ pub enum Remark {
         /// Out of how many.
         samples: usize,
     },
+    /// A channel without a single value.
+    #[error("channel {channel} was never observed: all its samples are missing")]
+    NeverObserved {
+        /// The channel.
+        channel: String,
+    },
     /// Something in the text was understood that could have meant something else.
     #[error("{what}")]
     Understood {
@@ -182,6 +188,7 @@ impl Remark {
             | Self::NoClock { .. }
             | Self::MayBeLabel { .. }
             | Self::NumbersLeftOut { .. }
+            | Self::NeverObserved { .. }
             | Self::Suspicion { .. } => Level::Warning,
             Self::MissingValues { missing, samples, .. } if 2 * missing > *samples => Level::Warning,
             _ => Level::Note,
@@ -199,6 +206,7 @@ impl Remark {
             Self::Uneven { .. } => Some("`period = SECONDS` brings them to even times".to_owned()),
             Self::Bursts { .. } => Some("`time = \"header\"` goes by the stamps in the messages".to_owned()),
             Self::Suspicion { suspicion } => suspicion.help(),
+            Self::NeverObserved { .. } => Some("leave it out: `channels = [...]` names what to learn".to_owned()),
             _ => None,
         }
     }

@@ -145,7 +145,11 @@ impl Samples {
             }
         }
         for (channel, missing) in self.channels.iter().zip(missing).filter(|(_, missing)| *missing > 0) {
-            self.remarks.push(Remark::MissingValues { channel: channel.clone(), missing, samples });
+            let channel = channel.clone();
+            self.remarks.push(match missing == samples {
+                true => Remark::NeverObserved { channel },
+                false => Remark::MissingValues { channel, missing, samples },
+            });
         }
         Ok(())
     }

@@ -1,6 +1,10 @@
 //! Which part of a file is meant, and how it is to be taken.
 
+use std::path::Path;
+
 use serde::{Deserialize, Serialize};
+
+use crate::format::Format;
 
 /// Which part of a file is meant. Write `Selection { channels, ..Selection::default() }`: fields are added with time.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -36,6 +40,42 @@ pub enum TimeSource {
     Log,
     /// Nothing: rows and messages are steps, whatever their clocks say.
     Rows,
+}
+
+impl TimeSource {
+    /// All there are.
+    pub const ALL: [Self; 4] = [Self::Header, Self::Publish, Self::Log, Self::Rows];
+
+    /// Its name.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Header => "header",
+            Self::Publish => "publish",
+            Self::Log => "log",
+            Self::Rows => "rows",
+        }
+    }
+
+    /// What it is, for help.
+    #[must_use]
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::Header => "the stamp inside of a message",
+            Self::Publish => "when a message was published",
+            Self::Log => "when a message was logged",
+            Self::Rows => "nothing: rows and messages are steps",
+        }
+    }
+}
+
+impl std::str::FromStr for TimeSource {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|time| time.word() == text);
+        found.ok_or_else(|| format!("`{text}` is no clock; there are {}", Self::ALL.map(Self::word).join(", ")))
+    }
 }
 
 /// What the axes of an array are: `n` sequences, `t` steps, `c` channels, in the order of the letters, e.g. `nct`.
@@ -116,6 +156,31 @@ impl Selection {
         self.time == Some(TimeSource::Rows)
     }
 
+    /// This selection, for the file at `path`; where it is silent, what a network's `learned` data were selected by, as far as
+    /// it makes sense for this kind of file.
+    #[must_use]
+    pub fn or_as_learned(self, path: &Path, learned: Self) -> Self {
+        // A folder of files, or a pattern, is what its first file is.
+        let first = || crate::expand(path).ok()?.into_iter().find_map(|file| Format::of(&file).ok());
+        let format = Format::of(path).ok().or_else(first);
+        let knows = |option: &str| format.is_some_and(|format| format.options.contains(&option));
+        let or = |own: Vec<String>, option: &str, learned: Vec<String>| {
+            if own.is_empty() && knows(option) { learned } else { own }
+        };
+        // What tells the time in a recording is no matter of tables.
+        let recording = knows("topics");
+        Self {
+            topics: or(self.topics, "topics", learned.topics),
+            time: self.time.or(learned.time.filter(|time| recording && *time != TimeSource::Rows)),
+            period: self.period.or(learned.period.filter(|_| recording)),
+            channels: self.channels.or(learned.channels),
+            arrays: or(self.arrays, "arrays", learned.arrays),
+            axes: self.axes,
+            unwrap: if self.unwrap.is_empty() { learned.unwrap } else { self.unwrap },
+            missing: if self.missing == Missing::Refuse { self.missing } else { learned.missing },
+        }
+    }
+
     /// The period, to the nanosecond.
     pub(crate) fn period_in_nanoseconds(&self) -> Option<u64> {
         self.period.map(|period| ((period * 1e9).round() as u64).max(1))
@@ -140,6 +205,29 @@ impl Selection {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_was_learned_fills_in_where_nothing_is_said_and_the_format_knows_it() {
+        let learned = Selection {
+            topics: vec!["/a".into()],
+            period: Some(0.5),
+            time: Some(TimeSource::Log),
+            arrays: vec!["qpos".into()],
+            channels: Some(vec!["x".into()]),
+            ..Selection::default()
+        };
+        let of = |path: &str, own: Selection| own.or_as_learned(Path::new(path), learned.clone());
+        let bag = of("x.mcap", Selection::default());
+        assert_eq!(bag, Selection { arrays: Vec::new(), ..learned.clone() });
+        let table = of("x.csv", Selection { channels: Some(vec!["y".into()]), ..Selection::default() });
+        assert_eq!(table, Selection { channels: Some(vec!["y".into()]), ..Selection::default() });
+        assert_eq!(of("x.npz", Selection::default()).arrays, ["qpos"]);
+        assert_eq!(of("x.mcap", Selection { topics: vec!["/b".into()], ..Selection::default() }).topics, ["/b"]);
+        for time in TimeSource::ALL {
+            assert_eq!(time.word().parse(), Ok(time));
+        }
+        assert!("stamp".parse::<TimeSource>().unwrap_err().contains("header, publish, log, rows"));
+    }
 
     #[test]
     fn axes_go_by_letters() {

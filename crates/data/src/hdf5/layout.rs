@@ -401,18 +401,25 @@ fn track(
         });
     }
     let width = samples.channels.len();
-    let mut values = file.budget.vec(steps.saturating_mul(width))?;
-    values.resize(steps * width, 0.0);
-    let mut column = 0;
-    for (_, found) in parts {
-        let wide = lengths(found).1.unwrap_or(1);
-        let numbers = contents.numbers(file, found)?;
-        for (row, part) in values.chunks_exact_mut(width).zip(numbers.chunks_exact(wide)) {
-            row[column..column + wide].copy_from_slice(part);
+    let values = match parts {
+        // Nothing to copy.
+        [(_, only)] => contents.numbers(file, only)?,
+        parts => {
+            let mut values = file.budget.vec(steps.saturating_mul(width))?;
+            values.resize(steps * width, 0.0);
+            let mut column = 0;
+            for (_, found) in parts {
+                let wide = lengths(found).1.unwrap_or(1);
+                let numbers = contents.numbers(file, found)?;
+                for (row, part) in values.chunks_exact_mut(width).zip(numbers.chunks_exact(wide)) {
+                    row[column..column + wide].copy_from_slice(part);
+                }
+                file.budget.give_back(numbers.len() * size_of::<f64>());
+                column += wide;
+            }
+            values
         }
-        file.budget.give_back(numbers.len() * size_of::<f64>());
-        column += wide;
-    }
+    };
     let mut times = Vec::new();
     if let Some(clock) = clock.filter(|clock| lengths(clock) == (steps, None)) {
         let numbers = contents.numbers(file, clock)?;

@@ -78,13 +78,22 @@ impl Episodes {
         while row < rows {
             // Rows of one episode stand together.
             let number = episode.map_or(Ok(0), |cells| whole(cells, row, plan.episode.as_ref()))?;
-            let into = self.all.entry(number).or_default();
-            while row < rows {
-                if let Some(cells) = episode
-                    && whole(cells, row, plan.episode.as_ref())? != number
-                {
-                    break;
+            let mut end = rows;
+            if let Some(cells) = episode {
+                end = row + 1;
+                while end < rows && whole(cells, end, plan.episode.as_ref())? == number {
+                    end += 1;
                 }
+            }
+            let into = self.all.entry(number).or_default();
+            // What grows by doubling holds up to three times what it needs; what grows row by row is copied for each.
+            let more = (end - row).saturating_mul(plan.channels.len());
+            if more > into.values.len() / 8 {
+                into.values.reserve_exact(more);
+                into.frames.reserve_exact(if frame.is_some() { end - row } else { 0 });
+                into.clock.reserve_exact(if clock.is_some() { end - row } else { 0 });
+            }
+            while row < end {
                 for ((cells, &width), feature) in features.iter().zip(widths).zip(plan.taken()) {
                     match cells.row(row) {
                         [] => into.values.extend(std::iter::repeat_n(f64::NAN, width)),

@@ -54,7 +54,11 @@ pub fn read(source: &Source<'_>, selection: &Selection) -> Result<Samples, FileE
             let source = Source::at(file)?;
             reading.take(&source)?;
         }
-        return reading.finish(source.name());
+        let mut samples = reading.finish(source.name())?;
+        if let Some(names) = names(path, samples.tracks.len()) {
+            samples.tracks.iter_mut().zip(names).for_each(|(track, name)| track.name = name);
+        }
+        return Ok(samples);
     }
     // data/chunk-000/file-000.parquet in the data set's folder.
     let root = path.ancestors().nth(3).filter(|root| path.is_file() && root.join(info::PLACE).is_file());
@@ -62,6 +66,18 @@ pub fn read(source: &Source<'_>, selection: &Selection) -> Result<Samples, FileE
     reading.take(source)?;
     reading.whole = false;
     reading.finish(source.name())
+}
+
+/// Most bytes of a list of names.
+const LONGEST_NAMES: u64 = 1 << 26;
+
+/// Names of so many episodes, if [`write`] left some.
+fn names(root: &Path, count: usize) -> Option<Vec<String>> {
+    let path = root.join(write::NAMES);
+    let length = std::fs::metadata(&path).ok()?.len();
+    let text = (length <= LONGEST_NAMES).then(|| std::fs::read(&path).ok()).flatten()?;
+    let names: Vec<String> = serde_json::from_slice(&text).ok()?;
+    (names.len() == count).then_some(names)
 }
 
 fn info_of(root: &Path) -> Result<Option<Info>, FileError> {

@@ -4,6 +4,7 @@
 //! meta/info.json, meta/stats.json, meta/tasks.parquet
 //! meta/episodes/chunk-000/file-000.parquet     where the frames of each episode are
 //! data/chunk-000/file-000.parquet              the frames, a group of rows for each episode
+//! meta/sequences.json                          names of the episodes, which LeRobot does not read
 //! ```
 //!
 //! Channels called `observation.state.X` and `action.X` become these features; all are `observation.state` where no
@@ -22,6 +23,8 @@ const LARGEST_FILE: usize = 100 << 20;
 const FILES_IN_CHUNK: usize = 1000;
 /// Values in a page at most: its bytes are counted in 32 bits.
 const MOST_VALUES: usize = 1 << 25;
+/// Where the names of sequences are.
+pub const NAMES: &str = "meta/sequences.json";
 const MAIN: [&str; 2] = ["observation.state", "action"];
 
 /// A feature: its name, the columns of the data that it takes, and what these are called.
@@ -93,6 +96,9 @@ pub fn files(path: &str, data: &Dataset, period: Option<f64>, task: &str) -> Res
     files.push(("meta/tasks.parquet".to_owned(), tasks(task)));
     files.push((info::PLACE.to_owned(), pretty(&about(data, &features, period, short, &episodes))));
     files.push(("meta/stats.json".to_owned(), pretty(&statistics(data, &features, period))));
+    // Their own files have no place for names.
+    let names: Vec<&str> = data.sequences().iter().map(|sequence| sequence.name.as_str()).collect();
+    files.push((NAMES.to_owned(), pretty(&json!(names))));
     Ok(files)
 }
 

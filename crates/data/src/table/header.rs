@@ -7,6 +7,7 @@ use crate::remark::Remark;
 
 use super::fields::{DetectionOrder, Field, Separator, split};
 use super::lines::{Kind, Line, lines};
+use super::markers;
 use super::numbers::{Cell, Notation, Value, has_decimal_comma, has_thousands};
 use super::roles::{is_unit, nanoseconds_in, role, without_unit};
 
@@ -32,6 +33,8 @@ pub struct Layout {
     pub header: Option<String>,
     /// Whether the columns have names of their own.
     pub named: bool,
+    /// Samples a second, if the lines above tell it.
+    pub rate: Option<f64>,
     /// The columns.
     pub columns: Vec<Column>,
     /// What was understood on the way.
@@ -160,6 +163,13 @@ impl Layout {
         self.counted = last.number;
         self.named = true;
         self.header = Some(last.text.to_owned());
+        self.rate = markers::rate(above);
+        if let Some(listed) = count.filter(|count| trimmed(names) != *count).and_then(|count| markers::names(above, count)) {
+            let what = "the columns are called after the markers in the lines above".to_owned();
+            self.remarks.push(Remark::Understood { what });
+            self.columns = listed.into_iter().map(|name| column(Some(name))).collect();
+            return Ok(());
+        }
         let mut names: Vec<Cow<'_, str>> = names.iter().map(|field| field.text.clone()).collect();
         if let (Some(row), Some(count)) = (row, count) {
             let cells = fields_of(&row, separator);
@@ -174,8 +184,13 @@ impl Layout {
             self.columns = names.into_iter().map(|name| column(Some(name.into_owned()))).collect();
             return Ok(());
         }
-        let fitting =
-            |(_, fields): &&(Line<'_>, Fields<'_>)| trimmed(fields) > 1 && fields.len().abs_diff(names.len()) <= 1;
+        // Names that stand over groups of columns may end early, and begin late.
+        let grouped = |fields: &Fields<'_>| {
+            fields.first().is_some_and(|field| field.text.is_empty()) && fields.len() <= names.len()
+        };
+        let fitting = |(_, fields): &&(Line<'_>, Fields<'_>)| {
+            trimmed(fields) > 1 && (fields.len().abs_diff(names.len()) <= 1 || grouped(fields))
+        };
         let mut levels: Vec<Vec<Cow<'_, str>>> = above[..above.len() - 1]
             .iter()
             .rev()
@@ -461,11 +476,12 @@ fn first_of_samples(head: &[Line<'_>], detect: impl Fn(&Line<'_>) -> Separator) 
         if is_header(&fields, index) {
             continue;
         }
-        // A title or a setting above the table.
+        // A title or a setting above the table; a rate alone above its header.
+        let is_word =
+            |field: &Field<'_>| Cell::of(&field.text, Notation::Point) == Cell::Word && !has_decimal_comma(&field.text);
+        let names_follow = || head[index + 1..].iter().any(|line| is_header(&fields_of(line, detect(line)), index + 1));
         let is_title = usual.is_some_and(|usual| shape(line) != usual)
-            && fields
-                .iter()
-                .any(|field| Cell::of(&field.text, Notation::Point) == Cell::Word && !has_decimal_comma(&field.text));
+            && (fields.iter().any(is_word) || trimmed(&fields) == 1 && names_follow());
         if !is_title {
             return index;
         }

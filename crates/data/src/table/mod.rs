@@ -8,6 +8,8 @@
 //!   ([`roles`]) and by how their values behave ([`assembly`], [`clock`]). What is asked for by name is a channel.
 //! - Rows belong together that have the same label. Without labels a blank line ends a sequence, and so does a clock or
 //!   counter that begins again. Rows keep the order they have in the file.
+//! - A table without a header whose rows are series with their class before them, is taken so ([`classes`]). Headers of motion
+//!   capture are known ([`markers`]).
 //! - Sequences may differ in length. Without a name they are called 1, 2, ...
 
 use std::ops::Range;
@@ -27,12 +29,14 @@ use numbers::{Value, has_decimal_comma};
 use rows::{Bad, Plan, Rows, Stop, plans};
 
 mod assembly;
+mod classes;
 mod clock;
 mod dates;
 mod decode;
 mod fields;
 mod header;
 mod lines;
+mod markers;
 mod numbers;
 mod roles;
 mod rows;
@@ -69,6 +73,14 @@ fn read(source: &Source<'_>, order: DetectionOrder, selection: &Selection) -> Re
         (rows.columns.iter().map(|kept| kept.bad.clone()).collect(), rows.trailing_comments);
     let asked = selection.channels.is_some();
     let assembly = assemble(&layout, &plans, rows, source.budget(), asked).map_err(over)?;
+    // What is no number at all is a typing error, and is shown.
+    let typed = bad.iter().all(|[_, other]| other.is_none());
+    if typed && !layout.named && !asked && selection.period.is_none() && !selection.ignores_time() {
+        source.budget().take_values::<f64>(assembly.samples.tracks.iter().map(|one| one.values.len()).sum()).map_err(over)?;
+        if let Some(samples) = classes::by_rows(&assembly.samples) {
+            return Ok(samples);
+        }
+    }
     if let Some(error) = table.first_error(&assembly, &plans, bad, selection) {
         return Err(error);
     }
@@ -76,6 +88,10 @@ fn read(source: &Source<'_>, order: DetectionOrder, selection: &Selection) -> Re
         return Err(table.no_channel(&layout, selection));
     }
     let mut samples = assembly.samples;
+    if let Some(rate) = layout.rate.filter(|_| samples.facts.clock.is_none()) {
+        samples.period = Some(1.0 / rate);
+        samples.remarks.push(Remark::Understood { what: format!("{rate} images a second, as the lines above tell") });
+    }
     if trailing > 0 {
         let what = format!("what stands behind `#` at the end of {trailing} lines was passed over");
         samples.remarks.push(Remark::Understood { what });
