@@ -12,6 +12,8 @@ mod following;
 mod numbers;
 #[path = "cli/numbers_table.rs"]
 mod numbers_table;
+#[path = "cli/own_data.rs"]
+mod own_data;
 #[path = "cli/reaching.rs"]
 mod reaching;
 #[path = "cli/recordings.rs"]
@@ -116,6 +118,14 @@ impl Place {
 
     fn json(&self, line: &str) -> Value {
         serde_json::from_str(&self.ok(line)).unwrap()
+    }
+
+    /// Runs a command that should succeed; its stdout and stderr.
+    fn says(&self, line: &str) -> (String, String) {
+        let output = self.run(line);
+        let err = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(0), "scrnn {line}\n{err}");
+        (String::from_utf8(output.stdout).unwrap(), err)
     }
 
     /// Runs a command that should end with `code`; its stderr as printed, and with line breaks taken out.

@@ -141,7 +141,7 @@ fn inspect_shows_runs_checkpoints_and_data() {
         .iter()
         .map(|one| one["name"].as_str().unwrap().to_owned())
         .collect();
-    assert_eq!(names, ["000", "001"]);
+    assert_eq!(names, ["1", "2"]);
     assert!(run.contains("instruction set: ") && place.ok("--version").contains("instruction set"));
     let portable = place.json("inspect run --json --instruction-set portable");
     assert_eq!(portable["instruction_set"], "portable");

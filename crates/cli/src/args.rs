@@ -5,7 +5,8 @@ use std::path::Path;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use scrnn::engine::{Engine, InstructionSet};
-use scrnn_data::Selection;
+use scrnn_data::{Axes, Selection, TimeSource};
+use scrnn_run::experiment::Override;
 use scrnn_run::failure::Result;
 use scrnn_run::messages::Messages;
 use scrnn_tasks::TaskName;
@@ -14,6 +15,9 @@ use crate::output;
 
 /// Where the options of every command stand in the help.
 const SHARED: &str = "Options of every command";
+
+/// Where options for reading data stand.
+const FILES: &str = "Options for data files";
 
 /// Options of every command.
 #[derive(Debug, Args)]
@@ -55,18 +59,30 @@ impl Messages for Shared {
     }
 }
 
-/// Which part of data files is meant.
+/// Which part of data files is meant, and how it is to be taken.
 #[derive(Debug, Clone, Default, Args)]
 pub struct Part {
-    /// In .mcap files, the topic whose messages are samples [default: /sensed, or the only one that is JSON]
-    #[arg(long, value_name = "TOPIC")]
-    pub topic: Option<String>,
-    /// In .mcap files, bring the messages to samples this many seconds apart, on straight lines between them
-    #[arg(long, value_name = "SECONDS", value_parser = period)]
+    /// In recordings, the topic whose messages are samples; several are joined [default: /sensed, or the only one]
+    #[arg(long, help_heading = FILES, value_name = "TOPIC,...", value_delimiter = ',')]
+    pub topic: Vec<String>,
+    /// What tells when a sample was taken; `rows` takes rows and messages as even steps [default: the best there is]
+    #[arg(long, help_heading = FILES, value_name = "CLOCK", value_parser = clocks())]
+    pub time: Option<TimeSource>,
+    /// Bring recordings, and tables with a clock, to samples this many seconds apart, on straight lines between them
+    #[arg(long, help_heading = FILES, value_name = "SECONDS", value_parser = period)]
     pub period: Option<f64>,
     /// The channels to take, by their names [default: all]
-    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    #[arg(long, help_heading = FILES, value_name = "NAME,...", value_delimiter = ',')]
     pub channels: Option<Vec<String>>,
+    /// Of files with several arrays or data sets, those to take, by name or path [default: the reader chooses]
+    #[arg(long, help_heading = FILES, value_name = "NAME,...", value_delimiter = ',')]
+    pub arrays: Vec<String>,
+    /// What the axes of an array are, a letter for each: `n` sequences, `t` steps, `c` channels, e.g. nct
+    #[arg(long, help_heading = FILES, value_name = "LETTERS")]
+    pub axes: Option<Axes>,
+    /// Channels that are angles: their jumps of a whole turn are taken out
+    #[arg(long, help_heading = FILES, value_name = "NAME,...", value_delimiter = ',')]
+    pub unwrap: Vec<String>,
 }
 
 /// A parser for numbers of things, which says its range.
@@ -94,22 +110,46 @@ fn period(text: &str) -> std::result::Result<f64, String> {
 impl Part {
     /// What it selects in the file at `path`; where it is silent, what `learned` of its training's data says.
     pub fn of(&self, path: &Path, learned: Option<Selection>) -> Selection {
-        let Selection { topics, period, channels, arrays, unwrap, .. } = learned.unwrap_or_default();
-        let is = |wanted: &str| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(wanted));
-        let recording = path.is_dir() || is("mcap") || is("db3");
-        Selection {
-            topics: match &self.topic {
-                Some(topic) => vec![topic.clone()],
-                None if recording => topics,
-                None => Vec::new(),
-            },
-            period: self.period.or(period.filter(|_| recording)),
-            channels: self.channels.clone().or(channels),
-            arrays: if ["npz", "hdf5", "h5", "mat"].into_iter().any(is) { arrays } else { Vec::new() },
-            unwrap,
+        let own = Selection {
+            topics: self.topic.clone(),
+            time: self.time,
+            period: self.period,
+            channels: self.channels.clone(),
+            arrays: self.arrays.clone(),
+            axes: self.axes,
+            unwrap: self.unwrap.clone(),
             ..Selection::default()
-        }
+        };
+        own.or_as_learned(path, learned.unwrap_or_default())
     }
+
+    /// The same as replacements of an experiment's keys.
+    pub fn overrides(&self) -> Vec<Override> {
+        let mut all = Vec::new();
+        all.extend(match self.topic.as_slice() {
+            [] => None,
+            [only] => Some(Override::text("--topic", "data.topic", only).instead_of("topics")),
+            several => Some(Override::list("--topic", "data.topics", several).instead_of("topic")),
+        });
+        all.extend(self.time.map(|time| Override::text("--time", "data.time", time.word())));
+        all.extend(self.period.map(|period| Override::number("--period", "data.period", period)));
+        all.extend(self.axes.map(|axes| Override::text("--axes", "data.axes", &axes.to_string())));
+        let channels = self.channels.as_deref().unwrap_or_default();
+        for (option, key, names) in [
+            ("--channels", "data.channels", channels),
+            ("--arrays", "data.arrays", &self.arrays),
+            ("--unwrap", "data.unwrap", &self.unwrap),
+        ] {
+            all.extend((!names.is_empty()).then(|| Override::list(option, key, names)));
+        }
+        all
+    }
+}
+
+/// A parser for what tells the time.
+fn clocks() -> impl TypedValueParser<Value = TimeSource> {
+    let word = |time: TimeSource| PossibleValue::new(time.word()).help(time.about());
+    PossibleValuesParser::new(TimeSource::ALL.map(word)).try_map(|word| word.parse::<TimeSource>())
 }
 
 /// A parser for the names of tasks, which also tells the shell and the help what there is.

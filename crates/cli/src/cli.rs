@@ -6,7 +6,7 @@ use clap::{Parser, Subcommand};
 use scrnn::engine::InstructionSet;
 
 use crate::args::Shared;
-use crate::command::{completions, data, generate, inspect, recognize, report, reproduce, simulate, train};
+use crate::command::{completions, convert, data, generate, inspect, recognize, report, reproduce, simulate, train};
 
 static VERSION: LazyLock<String> =
     LazyLock::new(|| format!("{} (instruction set {})", env!("CARGO_PKG_VERSION"), InstructionSet::best()));
@@ -22,7 +22,8 @@ The thesis' chapter 3, with a page to look at:
 
 And on data of your own:
   scrnn inspect mine.csv                                what scrnn makes of the file
-  scrnn train mine.toml                                 an experiment with files = [\"mine.csv\"]
+  scrnn inspect mine.csv --plot mine.html               and what they look like
+  scrnn train mine.csv                                  with settings that suit the data, into runs/mine
   scrnn recognize runs/mine new.csv                     which learned sequence is this?
   scrnn report runs/mine                                the run as a page
 
@@ -62,6 +63,7 @@ pub enum Command {
     Reproduce(reproduce::Arguments),
     Report(report::Arguments),
     Inspect(inspect::Arguments),
+    Convert(convert::Arguments),
     /// Print the JSON schema of the experiment file
     ///
     /// Editors with a TOML language server complete and check an experiment file that begins with

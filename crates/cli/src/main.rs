@@ -31,6 +31,7 @@ fn main() -> ExitCode {
         Command::Reproduce(arguments) => command::reproduce::run(&arguments, (&shared, &signals)),
         Command::Report(arguments) => command::report::run(&arguments, &shared),
         Command::Inspect(arguments) => command::inspect::run(&arguments, &shared),
+        Command::Convert(arguments) => command::convert::run(&arguments, &shared),
         Command::Schema => command::schema::run(),
         Command::Completions(arguments) => command::completions::run(&arguments),
     };

@@ -1,6 +1,8 @@
-//! Pages about trained networks: what is drawn of a run wherever runs are shown.
+//! Pages about trained networks and their data: what is drawn of a run wherever runs are shown, and what is told of files.
 
 mod blocks;
+pub mod data_page;
+pub mod inspection;
 pub mod run_page;
 mod writing;
 

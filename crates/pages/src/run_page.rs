@@ -7,6 +7,7 @@ use scrnn::generation::{Feedback, Generated, GenerationOptions};
 
 use scrnn_report::{Block, Chart, Figure, Mark, Page, Panel, Section, Series, Sheet, Tone};
 use scrnn_run::assessment::{self, Assessment, Predictions};
+use scrnn_run::channel_scores::{ChannelScore, channel_scores};
 use scrnn_run::experiment::Experiment;
 use scrnn_run::failure::Result;
 use scrnn_run::history::Row;
@@ -63,6 +64,7 @@ pub fn page(trained: &Trained, data: &Dataset, rows: &[Row], seed: u64, engine: 
     let runs = [("this run".to_owned(), rows)];
     let mut learning = vec![learning_curves("learning", "Learning curve", &runs, assessment.entropy_of_noise)];
     let mut ahead: Vec<Block> = drawn(data, trained, &open, true);
+    ahead.push(channel_sheet(&channel_scores(&scaled, &open, delay, &checkpoint.scaling)));
     ahead.extend(calibration_blocks(&assessment));
     if let Some(score) = trained.notes.as_ref().and_then(|notes| notes.score) {
         let rows = vec![
@@ -84,6 +86,17 @@ pub fn page(trained: &Trained, data: &Dataset, rows: &[Row], seed: u64, engine: 
         sections.push(Section { title: "Settings".into(), blocks: vec![Block::Verbatim(text)] });
     }
     Ok(Page { title: format!("Run: {name}"), lede, sections })
+}
+
+/// How each channel is predicted, in its own units.
+fn channel_sheet(scores: &[ChannelScore]) -> Block {
+    let row = |score: &ChannelScore| vec![score.channel.clone(), score.share(), score.error()];
+    Block::Sheet(Sheet {
+        caption: "Each channel, one step ahead".into(),
+        head: ["channel", "variance explained", "rms error"].map(String::from).to_vec(),
+        rows: scores.iter().map(row).collect(),
+        note: "Errors are in the data's units. 100 % would be right throughout; at 0 % the channel's mean does as well.".into(),
+    })
 }
 
 /// The first sequences over time, a figure for each channel, in the data's units.

@@ -3,12 +3,15 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`experiment`] | the experiment file: its types, how it is read, checked, overridden and compared |
+//! | [`request`], [`recipe`] | what `train` is given: an experiment file, a run folder, or data alone, for which settings are chosen |
 //! | [`source`] | the sequences of an experiment, made or read, and their fingerprint |
 //! | [`training`] | one training, from a resolved experiment to a run folder: begun, gone on with, or begun anew |
 //! | [`verdict`] | the result of a training, in words and as JSON |
 //! | [`run_folder`], [`history`], [`notes`] | what a training leaves behind |
 //! | [`trained`], [`channels`] | a trained network as it is found again, and new data brought to its channels by name |
-//! | [`assessment`], [`truth`] | how well it predicts, beside simple models and what is known of the noise |
+//! | [`assessment`], [`truth`], [`channel_scores`] | how well it predicts, beside simple models and what is known of the noise |
+//! | [`familiar`] | new data beside the range of what was learned |
+//! | [`conversion`] | data from one kind of file to another |
 //! | [`messages`], [`interrupt`] | how news and progress leave, and how a person's wish to stop comes in |
 //! | [`memory`] | what would not fit is refused before it is tried |
 //! | [`failure`] | what ends a request early, and with which exit code |
@@ -16,14 +19,19 @@
 //! Nothing here knows a terminal or a command line: progress and messages are handed in.
 
 pub mod assessment;
+pub mod channel_scores;
 pub mod channels;
+pub mod conversion;
 pub mod experiment;
 pub mod failure;
+pub mod familiar;
 pub mod history;
 pub mod interrupt;
 pub mod memory;
 pub mod messages;
 pub mod notes;
+pub mod recipe;
+pub mod request;
 pub mod run_folder;
 pub mod source;
 pub mod trained;

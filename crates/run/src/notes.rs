@@ -28,6 +28,9 @@ pub struct DataNotes {
     pub digest: String,
     /// Samples in each sequence.
     pub lengths: Vec<usize>,
+    /// The least and the greatest sample of each channel, in the data's units. Empty in checkpoints of earlier versions.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub ranges: Vec<(f64, f64)>,
 }
 
 /// How well the network of an epoch predicts the sequences that it learned.

@@ -10,6 +10,8 @@ use serde::Deserialize;
 use crate::channels;
 use crate::experiment::Experiment;
 use crate::failure::{Failure, Result};
+use crate::familiar;
+use crate::messages::Messages;
 use crate::notes::Notes;
 use crate::run_folder::{BEST, CHECKPOINT};
 use crate::source;
@@ -59,6 +61,28 @@ impl Trained {
         self.network.clone()
     }
 
+    /// The learned sequence of this name, or else of this number, counted from 1: its place.
+    ///
+    /// # Errors
+    /// [`Failure::Input`] with the names there are.
+    pub fn sequence(&self, wanted: &str) -> Result<usize> {
+        let names = &self.checkpoint.sequences;
+        let number = || wanted.parse::<usize>().ok().filter(|number| (1..=names.len()).contains(number));
+        // Data from several files have the file's name before that of the sequence.
+        let only_one_ending_so = || {
+            let mut places = (0..names.len()).filter(|&place| names[place].rsplit('/').next() == Some(wanted));
+            places.next().filter(|_| places.next().is_none())
+        };
+        let named = names.iter().position(|name| name == wanted);
+        if let Some(place) = named.or_else(|| Some(number()? - 1)).or_else(only_one_ending_so) {
+            return Ok(place);
+        }
+        let (count, shown) = (names.len(), names.iter().take(20).map(String::as_str).collect::<Vec<_>>().join(", "));
+        let more = if count > 20 { ", ..." } else { "" };
+        let help = format!("the network learned {count}, counted from 1: {shown}{more}");
+        Err(Failure::input(format!("there is no learned sequence {wanted}"), help))
+    }
+
     /// Which part of its files it learned, where that is known.
     pub fn selection(&self) -> Option<Selection> {
         let experiment = Experiment::deserialize(&self.notes.as_ref()?.experiment).ok()?;
@@ -101,6 +125,20 @@ impl Trained {
                 );
                 return Err(Failure::input(message, "are these data in the units of those that were learned?"));
             }
+        }
+        Ok(data)
+    }
+}
+
+impl Trained {
+    /// As [`Trained::fitted`]; channels far outside of what was learned are said.
+    ///
+    /// # Errors
+    /// As [`Trained::fitted`].
+    pub fn fitted_aloud(&self, data: Dataset, path: &Path, messages: &dyn Messages) -> Result<Dataset> {
+        let data = self.fitted(data, path)?;
+        for one in familiar::unfamiliar(self, &data) {
+            messages.say(&format!("warning: {}: {one}", path.display()));
         }
         Ok(data)
     }

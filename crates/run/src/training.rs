@@ -10,8 +10,9 @@ use scrnn::scaling::Scaling;
 use scrnn::topology::Topology;
 use scrnn_data::Level;
 
-use crate::experiment::Experiment;
+use crate::experiment::{self, Experiment, ScalingChoice, ScalingName};
 use crate::failure::{Failure, Result};
+use crate::familiar::ranges;
 use crate::history::History;
 use crate::interrupt::Interrupt;
 use crate::messages::{Messages, Progress};
@@ -66,8 +67,26 @@ pub fn train(
     messages: &dyn Messages,
 ) -> Result<Training> {
     let source = source::load(&experiment.data, engine.threads())?;
+    train_on(experiment, source, (path, wanted), (engine, interrupt), progress, messages)
+}
+
+/// As [`train`], on what the experiment's data were found to be.
+///
+/// # Errors
+/// As [`train`].
+pub fn train_on(
+    experiment: &Experiment,
+    source: Source,
+    (path, wanted): (&Path, Found),
+    (engine, interrupt): (&Engine, &Interrupt),
+    progress: Box<dyn Progress>,
+    messages: &dyn Messages,
+) -> Result<Training> {
     if experiment.data.files.is_some() {
         introduce(experiment, &source, messages);
+    }
+    if !experiment.comments.is_empty() {
+        messages.say(&chosen(experiment, path));
     }
     let topology = experiment.bare_topology(source.data.channels().len())?;
     source.data.check_for(&topology)?;
@@ -76,7 +95,7 @@ pub fn train(
     let scaled = scaling.apply(&source.data);
     let topology = experiment.topology(&scaled)?;
     if !topology.has_linear_mean() && topology.skip().is_none() {
-        warn_out_of_reach(&scaled, messages);
+        warn_out_of_reach(experiment, &scaled, messages);
     }
 
     let (network, initial_states) = initialize(&topology, scaled.sequences().len(), experiment.seed);
@@ -86,6 +105,7 @@ pub fn train(
         data: DataNotes {
             digest: source::digest(&source.data),
             lengths: source.data.sequences().iter().map(|sequence| sequence.len()).collect(),
+            ranges: ranges(&source.data).into_iter().map(Option::unwrap_or_default).collect(),
         },
         score: None,
         best: None,
@@ -104,7 +124,7 @@ pub fn train(
         let notes = resume::check(&checkpoint, notes, experiment, path)?;
         learner = Learner::resume(&checkpoint, &scaled, experiment.plan(), engine)?;
         messages.say(&format!("going on with {} at epoch {}", path.display(), learner.epoch()));
-        write_experiment(&run, experiment)?;
+        keep_experiment(&run, experiment)?;
         (notes, History::go_on(&run, learner.epoch(), messages)?)
     } else {
         // In this order: a kill in between leaves a folder without a run rather than parts of two.
@@ -159,6 +179,18 @@ fn introduce(experiment: &Experiment, source: &Source, messages: &dyn Messages) 
     }
 }
 
+/// What was chosen where no experiment was given.
+fn chosen(experiment: &Experiment, path: &Path) -> String {
+    let groups = experiment.network.groups.iter();
+    let units = groups.map(|group| format!("{} units of time constant {}", group.units, group.time_constant));
+    format!(
+        "without an experiment file: {}, {} epochs; {} has all settings and says why",
+        units.collect::<Vec<_>>().join(" and "),
+        experiment.training.epochs,
+        path.join(EXPERIMENT).display()
+    )
+}
+
 /// Channels whose predicted samples are all the same.
 pub fn still_channels(data: &Dataset, delay: usize) -> Vec<String> {
     let n = data.channels().len();
@@ -193,9 +225,20 @@ fn refuse_unbounded(data: &Dataset, topology: &Topology) -> Result<()> {
 }
 
 fn write_experiment(run: &RunFolder, experiment: &Experiment) -> Result<()> {
-    let text = toml::to_string(experiment).expect("the experiment came from such a file");
-    let head = "# Written by scrnn train: the experiment with every value explicit.\n";
-    run.write(EXPERIMENT, format!("{head}{text}").as_bytes())
+    let head = match experiment.comments.is_empty() {
+        true => "# Written by scrnn train: the experiment with every value explicit.\n",
+        false => {
+            "# Chosen and written by scrnn train, as no experiment file was given: every value, and why where there was a \
+             choice.\n# To try others, copy this file, change it, and call `scrnn train` with the copy.\n\n"
+        }
+    };
+    run.write(EXPERIMENT, format!("{head}{}", experiment.to_file()).as_bytes())
+}
+
+/// Writes the experiment of a run that goes on, unless the file says the same: its comments are kept.
+fn keep_experiment(run: &RunFolder, experiment: &Experiment) -> Result<()> {
+    let kept = experiment::read(&run.file(EXPERIMENT), &[]).is_ok_and(|kept| kept.says_the_same(experiment));
+    if kept { Ok(()) } else { write_experiment(run, experiment) }
 }
 
 /// The first xi samples of each sequence: what a closed loop starts from. For a value that is missing stands what stood in for it as an
@@ -215,7 +258,12 @@ fn first_inputs(scaled: &Dataset, delay: usize) -> Vec<f64> {
 }
 
 /// The mean units reach from -1 to 1: samples beyond cannot be predicted.
-fn warn_out_of_reach(scaled: &Dataset, messages: &dyn Messages) {
+fn warn_out_of_reach(experiment: &Experiment, scaled: &Dataset, messages: &dyn Messages) {
+    let robust = experiment.data.scaling == Some(ScalingChoice::Named(ScalingName::Robust));
+    let what = match robust {
+        true => "scaled without its spikes, as \"robust\" means it",
+        false => "`scaling = \"fit\"` in [data] brings them inside",
+    };
     for (i, name) in scaled.channels().iter().enumerate() {
         let samples =
             scaled.sequences().iter().flat_map(|sequence| sequence.values().chunks_exact(scaled.channels().len()));
@@ -224,7 +272,7 @@ fn warn_out_of_reach(scaled: &Dataset, messages: &dyn Messages) {
             let total = scaled.total_samples();
             messages.say(&format!(
                 "warning: {beyond} of {total} samples of channel {name} lie outside of -1 to 1, where the network's \
-                 predictions end; `scaling = \"fit\"` in [data] brings them inside"
+                 predictions end; {what}"
             ));
         }
     }

@@ -8,6 +8,8 @@ use scrnn::evaluation::gaussian_entropy;
 use scrnn::learning::{Divergence, Outcome};
 use serde::Serialize;
 
+use crate::assessment;
+use crate::channel_scores::{ChannelScore, channel_scores};
 use crate::failure::Result;
 use crate::notes::Score;
 use crate::training::{Training, still_channels};
@@ -24,6 +26,8 @@ pub struct Verdict {
     /// The model that predicts each channel's mean and variance, whatever came before.
     constant_model: ConstantModel,
     best: Option<Score>,
+    /// How each channel is predicted one step ahead.
+    channels: Vec<ChannelScore>,
     truth: Option<Comparison>,
     divergence: Option<Place>,
     /// Channels that never change in the samples that are predicted, where the variance is predicted.
@@ -65,6 +69,9 @@ impl Verdict {
             }
             _ => None,
         };
+        let scaled = scaling.apply(&source.data);
+        let states: Vec<&[f64]> = (0..scaled.sequences().len()).map(|s| learner.initial_states().sequence(s)).collect();
+        let open = assessment::open_loop(learner.network(), &states, &scaled, engine)?;
         Ok(Self {
             run: run.clone(),
             outcome: match outcome {
@@ -75,8 +82,9 @@ impl Verdict {
             epoch: learner.epoch(),
             nll: score.and_then(|score| score.nll),
             mse: score.map(|score| score.mse),
-            constant_model: ConstantModel::of(&scaling.apply(&source.data), topology.delay())?,
+            constant_model: ConstantModel::of(&scaled, topology.delay())?,
             best: *best,
+            channels: channel_scores(&scaled, &open, topology.delay(), scaling),
             truth,
             divergence: match outcome {
                 Outcome::Diverged(divergence) => Some(Place::of(divergence)),
@@ -91,6 +99,25 @@ impl Verdict {
             threads: engine.threads(),
             instruction_set: engine.instruction_set().to_string(),
         })
+    }
+}
+
+/// Channels that are shown in words; the JSON object has all.
+const SHOWN: usize = 24;
+
+impl Verdict {
+    /// A line for each channel.
+    fn write_channels(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let names = self.channels.iter().take(SHOWN).map(|score| score.channel.chars().count());
+        let width = names.max().unwrap_or(0);
+        writeln!(f, "One step ahead, the share of each channel's variance that is explained, and the rms error in its own units:")?;
+        for score in self.channels.iter().take(SHOWN) {
+            writeln!(f, "  {:width$}  {:>8}  {}", score.channel, score.share(), score.error())?;
+        }
+        match self.channels.len().checked_sub(SHOWN) {
+            None | Some(0) => Ok(()),
+            Some(more) => writeln!(f, "  and {more} more: --json has all"),
+        }
     }
 }
 
@@ -148,6 +175,7 @@ impl fmt::Display for Verdict {
                 }
             }
         }
+        self.write_channels(f)?;
         if self.recoveries > 0 {
             writeln!(
                 f,

@@ -1,18 +1,17 @@
 //! `scrnn inspect`: what is in a run folder, a checkpoint or a data file.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
-use scrnn::checkpoint::Checkpoint;
-use scrnn::dataset::{Dataset, Sequence};
-use serde_json::{Value, json};
+use scrnn_pages::data_page::data_page;
+use scrnn_pages::inspection::{network_object, network_text, reading_object, reading_text};
+use serde_json::json;
 
 use crate::args::{Part, Shared};
 use crate::output;
-use scrnn_data::{self as files, Level, Reading, Remark};
-use scrnn_report::Table;
-use scrnn_run::failure::{Ending, Result};
-use scrnn_run::notes::Score;
+use crate::outputs::check_distinct;
+use scrnn_data::{self as files, Remark};
+use scrnn_run::failure::{Ending, Failure, Result};
 use scrnn_run::run_folder::CHECKPOINT;
 use scrnn_run::trained::Trained;
 
@@ -22,12 +21,16 @@ use scrnn_run::trained::Trained;
 Examples:
   scrnn inspect runs/sinusoid        network, epoch, nll, sequences
   scrnn inspect mine.csv             channels with their ranges, sequences with their lengths
+  scrnn inspect mine.csv --plot mine.html
   scrnn inspect runs/sinusoid --json | jq .epoch")]
 pub struct Arguments {
     /// A run folder, a .safetensors file or a data file
     path: PathBuf,
     #[command(flatten)]
     part: Part,
+    /// Of data: also write a page with all sequences of each channel over each other
+    #[arg(long, value_name = "PAGE.html")]
+    plot: Option<PathBuf>,
     /// Print a JSON object
     #[arg(long)]
     json: bool,
@@ -38,13 +41,20 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     let path = &arguments.path;
     let is_checkpoint = path.extension().is_some_and(|extension| extension == "safetensors");
     let is_run = path.is_dir() && path.join(CHECKPOINT).exists();
+    check_distinct(&[("--plot", arguments.plot.as_deref())], &[("PATH", Some(path))])?;
     let (object, text) = if is_run || is_checkpoint {
+        if arguments.plot.is_some() {
+            return Err(Failure::input("--plot draws data, and this is a network", "`scrnn report` makes a page of a run"));
+        }
         let trained = Trained::open(path, false)?;
         (network_object(&trained), network_text(&trained, path))
     } else {
         let mut reading = files::read_all(&[path], &arguments.part.of(path, None))?;
         let suspicions = files::suspicions::look(&reading.data).into_iter();
         reading.remarks.extend(suspicions.map(|suspicion| Remark::Suspicion { suspicion }));
+        if let Some(page) = &arguments.plot {
+            files::replace(page, data_page(&reading, path).html().as_bytes())?;
+        }
         (reading_object(&reading), reading_text(&reading, path))
     };
     if arguments.json {
@@ -56,192 +66,4 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         output::print(&format!("{text}instruction set: {}\n", shared.instruction_set()))?;
     }
     Ok(Ending::Done)
-}
-
-fn network_object(trained: &Trained) -> Value {
-    let Trained { checkpoint, notes, .. } = trained;
-    let topology = &checkpoint.topology;
-    let groups: Vec<Value> = topology
-        .groups()
-        .iter()
-        .map(|group| {
-            json!({
-                "name": group.name,
-                "units": group.units,
-                "time_constant": group.time_constant,
-                "receives_input": group.receives_input,
-                "drives_output": group.drives_output,
-                "learns_initial_state": group.learns_initial_state,
-            })
-        })
-        .collect();
-    let notes = notes.as_ref();
-    json!({
-        "kind": "network",
-        "epoch": checkpoint.epoch,
-        "score": notes.and_then(|notes| notes.score),
-        "best": notes.and_then(|notes| notes.best),
-        "delay": topology.delay(),
-        "variance": topology.has_variance(),
-        "variance_floor": topology.variance_floor(),
-        "groups": groups,
-        "parameters": checkpoint.parameters.as_slice().len(),
-        "channels": (0..checkpoint.channels.len()).map(|i| {
-            let (low, high) = reach(checkpoint, i);
-            json!({ "name": checkpoint.channels[i], "low": low, "high": high })
-        }).collect::<Vec<_>>(),
-        "sequences": checkpoint.sequences,
-        "lengths": notes.map(|notes| &notes.data.lengths),
-        "experiment": notes.map(|notes| &notes.experiment),
-    })
-}
-
-fn network_text(trained: &Trained, path: &Path) -> String {
-    let Trained { checkpoint, notes, .. } = trained;
-    let topology = &checkpoint.topology;
-    let mut table = Table::new(&[]);
-    let mut line = |what: &str, text: String| table.row(vec![format!("  {what}"), text]);
-    let experiment = notes.as_ref().map(|notes| &notes.experiment);
-    let epochs = experiment.and_then(|experiment| experiment["training"]["epochs"].as_u64());
-    let of = epochs.map_or(String::new(), |epochs| format!(" of {epochs}"));
-    line("epoch", format!("{}{of}", checkpoint.epoch));
-    if let Some(notes) = notes {
-        if let Some(score) = notes.score {
-            line("score", told(score));
-        }
-        if let Some(best) = notes.best {
-            line("best", format!("{}, at epoch {}", told(best), best.epoch));
-        }
-    }
-    let kind = match topology.has_variance() {
-        true => format!("mean and variance (floor {})", topology.variance_floor()),
-        false => "the mean".to_owned(),
-    };
-    line("predicts", format!("{kind}, {} ahead", counted(topology.delay(), "step")));
-    for group in topology.groups() {
-        let mut rules = String::new();
-        for (holds, rule) in [
-            (group.receives_input, ", sees no input"),
-            (group.drives_output, ", drives no output"),
-            (group.learns_initial_state, ", starts from 0"),
-        ] {
-            rules += if holds { "" } else { rule };
-        }
-        line(
-            "group",
-            format!("{}: {}, time constant {}{rules}", group.name, counted(group.units, "unit"), group.time_constant),
-        );
-    }
-    line("parameters", checkpoint.parameters.as_slice().len().to_string());
-    for (i, name) in checkpoint.channels.iter().enumerate() {
-        let (low, high) = reach(checkpoint, i);
-        line("channel", format!("{name}: predictions reach from {low:.4} to {high:.4}"));
-    }
-    let lengths = notes.as_ref().map(|notes| lengths(&notes.data.lengths)).unwrap_or_default();
-    line("sequences", format!("{}{lengths}", checkpoint.sequences.len()));
-    if let Some(optimiser) = experiment.and_then(|experiment| experiment["training"]["optimiser"].as_str()) {
-        let refined = experiment.is_some_and(|experiment| experiment["training"]["lbfgs"].is_object());
-        line("optimiser", format!("{optimiser}{}", if refined { ", then L-BFGS" } else { "" }));
-    }
-    let name = experiment.and_then(|experiment| experiment["name"].as_str()).unwrap_or("a network");
-    format!("{}: {name}\n{}", path.display(), table.to_string().trim_start_matches('\n'))
-}
-
-/// The raw values that the mean unit of a channel can reach, -1 to 1 in scaled units.
-fn reach(checkpoint: &Checkpoint, channel: usize) -> (f64, f64) {
-    let (a, b) = (checkpoint.scaling.to_raw(channel, -1.0), checkpoint.scaling.to_raw(channel, 1.0));
-    (a.min(b), a.max(b))
-}
-
-fn told(score: Score) -> String {
-    match score.nll {
-        Some(nll) => format!("nll {nll:.4} nats per step and channel, mse {:.4e}", score.mse),
-        None => format!("mse {:.4e} per step and channel", score.mse),
-    }
-}
-
-fn reading_object(reading: &Reading) -> Value {
-    let mut object = data_object(&reading.data);
-    object["period"] = json!(reading.period);
-    object["remarks"] = reading.remarks.iter().map(Remark::json).collect();
-    object["facts"] = json!(reading.facts);
-    object
-}
-
-/// The data, then what is known of the file, then what is worth saying.
-fn reading_text(reading: &Reading, path: &Path) -> String {
-    let mut text = data_text(&reading.data, path);
-    text += &format!("format: {}\n", reading.facts.format);
-    if let Some(period) = reading.period {
-        let clock = reading.facts.clock.as_ref().map_or(String::new(), |clock| format!(", by {clock}"));
-        text += &format!("a sample every {period} s ({} Hz){clock}\n", (1e3 / period).round() / 1e3);
-    }
-    for topic in &reading.facts.topics {
-        let taken = if topic.taken { "taken" } else { "not taken" };
-        let rate = topic.rate.map_or(String::new(), |rate| format!(", {} Hz", (1e3 * rate).round() / 1e3));
-        text += &format!("  {} ({}): {}{rate}, {taken}\n", topic.name, topic.of, topic.count);
-    }
-    for gap in &reading.facts.gaps {
-        text += &format!("gap in {} after sample {}: {} s\n", gap.sequence, gap.after, gap.seconds);
-    }
-    for remark in &reading.remarks {
-        let kind = if remark.level() == Level::Warning { "warning" } else { "note" };
-        let help = remark.help().map_or(String::new(), |help| format!(" ({help})"));
-        text += &format!("{kind}: {remark}{help}\n");
-    }
-    text
-}
-
-fn data_object(data: &Dataset) -> Value {
-    let moments = data.channel_moments();
-    let channels: Vec<Value> = data
-        .channels()
-        .iter()
-        .enumerate()
-        .map(|(i, name)| {
-            let ((low, high), (mean, variance)) = (range(data, i), moments[i]);
-            json!({ "name": name, "low": low, "high": high, "mean": mean, "variance": variance })
-        })
-        .collect();
-    let sequence = |sequence: &Sequence| json!({ "name": sequence.name, "samples": sequence.len() });
-    json!({
-        "kind": "data",
-        "channels": channels,
-        "sequences": data.sequences().iter().map(sequence).collect::<Vec<_>>(),
-        "samples": data.total_samples(),
-    })
-}
-
-fn data_text(data: &Dataset, path: &Path) -> String {
-    let all: Vec<usize> = data.sequences().iter().map(Sequence::len).collect();
-    let mut table = Table::new(&["  channel", "from", "to", "mean", "sd"]);
-    for (i, (name, (mean, variance))) in data.channels().iter().zip(data.channel_moments()).enumerate() {
-        let (low, high) = range(data, i);
-        let cells = [low, high, mean, variance.sqrt()].map(|value| format!("{value:.6}"));
-        table.row([vec![format!("  {name}")], cells.to_vec()].concat());
-    }
-    let count = counted(all.len(), "sequence");
-    let channels = counted(data.channels().len(), "channel");
-    format!("{}: {count}{}, {channels}\n{table}", path.display(), lengths(&all))
-}
-
-/// Smallest and largest sample of a channel.
-fn range(data: &Dataset, channel: usize) -> (f64, f64) {
-    let n = data.channels().len();
-    let samples = data.sequences().iter().flat_map(|sequence| sequence.values().chunks_exact(n)).map(|x| x[channel]);
-    samples.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
-}
-
-/// `1 step`, `2 steps`.
-fn counted(count: usize, what: &str) -> String {
-    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
-}
-
-/// How long sequences are.
-fn lengths(all: &[usize]) -> String {
-    match (all.iter().min(), all.iter().max()) {
-        (Some(shortest), Some(longest)) if shortest == longest => format!(" of {}", counted(*longest, "sample")),
-        (Some(shortest), Some(longest)) => format!(" of {shortest} to {longest} samples"),
-        _ => String::new(),
-    }
 }

@@ -1,6 +1,7 @@
 //! One file for each command.
 
 pub mod completions;
+pub mod convert;
 pub mod data;
 pub mod generate;
 pub mod inspect;

@@ -5,20 +5,23 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use scrnn::learning::Outcome;
 
-use crate::args::Shared;
+use crate::args::{Part, Shared};
 use crate::output;
 use crate::progress::Bars;
 use crate::signals::Signals;
-use scrnn_run::experiment::{self, Override};
+use scrnn_run::experiment::Override;
 use scrnn_run::failure::{Ending, Failure, Result};
-use scrnn_run::run_folder::{BEST, CHECKPOINT, EXPERIMENT};
-use scrnn_run::training::{Found, Training, train};
+use scrnn_run::request::{self, Asked, Request};
+use scrnn_run::run_folder::{BEST, CHECKPOINT};
+use scrnn_run::source;
+use scrnn_run::training::{Found, Training, train_on};
 use scrnn_run::verdict::Verdict;
 
-/// Train a network as an experiment file says
+/// Train a network as an experiment file says, or on data files alone
 ///
 /// The run folder receives experiment.toml (every value explicit), checkpoint.safetensors (the newest state),
-/// best.safetensors (the lowest nll so far) and history.csv (how training went). Ctrl-C (also SIGTERM,
+/// best.safetensors (the lowest nll so far) and history.csv (how training went). Given data files alone, settings are chosen by
+/// the data; experiment.toml then says why, and is a good beginning for an experiment of your own. Ctrl-C (also SIGTERM,
 /// SIGHUP, SIGUSR1 and SIGXCPU, unless the parent ignores them as nohup does) ends the epoch, saves, and says how to go on; a
 /// run that was killed goes on from its last checkpoint. Either way the result is the same to the bit as
 /// if the run had never stopped.
@@ -26,12 +29,15 @@ use scrnn_run::verdict::Verdict;
 #[command(after_help = "\
 Examples:
   scrnn train assets/experiments/sinusoid.toml
+  scrnn train mine.csv                                       into runs/mine, with settings that suit the data
+  scrnn train bags/ --topic /joint_states --period 0.02      all recordings in a folder
   scrnn train sinusoid.toml --seed 2 --out runs/sinusoid-2 --set training.momentum.rate=1e-3
   scrnn train runs/sinusoid --resume --epochs 200000")]
 pub struct Arguments {
-    /// The experiment file; with --resume also a run folder, which holds its own
-    experiment: PathBuf,
-    /// The run folder [default: runs/NAME, after the experiment's name]
+    /// The experiment file, or data files, folders of them or patterns; with --resume also a run folder
+    #[arg(required = true, value_name = "EXPERIMENT|DATA")]
+    paths: Vec<PathBuf>,
+    /// The run folder [default: runs/NAME, after the experiment's name or the data]
     #[arg(long, short, value_name = "RUN")]
     out: Option<PathBuf>,
     /// Go on with the run in the run folder, or start it if there is none
@@ -46,9 +52,11 @@ pub struct Arguments {
     /// Seed of the initial weights. Short for --set seed=N
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// In .mcap files, the topic whose messages are samples. Short for --set data.topic=TOPIC
-    #[arg(long, value_name = "TOPIC")]
-    topic: Option<String>,
+    /// Data to learn instead of those that the experiment names
+    #[arg(long, value_name = "FILE,...", value_delimiter = ',')]
+    files: Vec<PathBuf>,
+    #[command(flatten)]
+    part: Part,
     /// Replace a value of the experiment, e.g. training.adam.rate=0.001 or network.groups.context.units=20
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<Override>,
@@ -66,39 +74,20 @@ impl Arguments {
                 overrides.push(Override::shorthand(option, key, value).map_err(|message| Failure::input(message, ""))?);
             }
         }
-        if let Some(topic) = &self.topic {
-            overrides.push(Override::text("--topic", "data.topic", topic));
+        if !self.files.is_empty() {
+            overrides.push(request::files(&self.files)?);
         }
+        overrides.extend(self.part.overrides());
         Ok(overrides)
-    }
-
-    /// The experiment file and, where the first argument is a run folder, that folder.
-    fn experiment_file(&self) -> Result<(PathBuf, Option<&Path>)> {
-        if !self.experiment.is_dir() {
-            return Ok((self.experiment.clone(), None));
-        }
-        let folder = self.experiment.display();
-        if !self.resume {
-            let help = format!("to go on with the run in it: scrnn train {folder} --resume");
-            return Err(Failure::input(format!("{folder} is a folder, not an experiment file"), help));
-        }
-        if self.out.is_some() {
-            return Err(Failure::input(
-                format!("--out says where to write, and so does {folder}"),
-                "leave --out away to go on in that folder",
-            ));
-        }
-        Ok((self.experiment.join(EXPERIMENT), Some(&self.experiment)))
     }
 }
 
 /// Trains.
 pub fn run(arguments: &Arguments, (shared, signals): (&Shared, &Signals)) -> Result<Ending> {
-    let (file, folder) = arguments.experiment_file()?;
-    let experiment = experiment::read(&file, &arguments.overrides()?)?;
-    let experiment = experiment.resolved(file.parent().unwrap_or(Path::new("")))?;
-    let default_folder = || Path::new("runs").join(&experiment.name);
-    let path = folder.map(Path::to_owned).or_else(|| arguments.out.clone()).unwrap_or_else(default_folder);
+    let overrides = arguments.overrides()?;
+    let asked = Request::of(&arguments.paths, arguments.resume)?;
+    let Asked { experiment, source, folder: path } =
+        asked.experiment(&overrides, arguments.out.as_deref(), arguments.resume)?;
 
     let engine = shared.engine()?;
     let interrupt = signals.listen();
@@ -113,7 +102,11 @@ pub fn run(arguments: &Arguments, (shared, signals): (&Shared, &Signals)) -> Res
     } else {
         Found::Refuse
     };
-    let training = train(&experiment, (&path, found), (&engine, &interrupt), progress, shared)?;
+    let source = match source {
+        Some(source) => source,
+        None => source::load(&experiment.data, engine.threads())?,
+    };
+    let training = train_on(&experiment, source, (&path, found), (&engine, &interrupt), progress, shared)?;
     let verdict = Verdict::new(&training, &engine)?;
     if arguments.json {
         output::print_json(&verdict)?;

@@ -10,7 +10,7 @@ use scrnn::topology::{Prediction, Topology};
 
 use super::{
     Data, Experiment, MeanUnits, OptimiserName, ScalingChoice, ScalingConstants, ScalingName, ScalingRanges, SkipName,
-    TaskName, TimeSourceName, Training,
+    TaskName, TimeSourceName, Training, robust,
 };
 use crate::failure::{Failure, Result};
 use scrnn_data::{Selection, TimeSource};
@@ -150,6 +150,9 @@ impl Data {
         };
         match &self.scaling {
             Some(ScalingChoice::Named(ScalingName::Fit)) => Ok(Scaling::fit(data, Scaling::RANGE)),
+            Some(ScalingChoice::Named(ScalingName::Robust)) => {
+                Ok(Scaling::from_ranges(&robust::ranges(data), Scaling::RANGE))
+            }
             Some(ScalingChoice::Ranges(ScalingRanges { ranges })) => {
                 fits("ranges", ranges.len())?;
                 Ok(Scaling::from_ranges(ranges, Scaling::RANGE))

@@ -4,18 +4,21 @@
 //! every default filled in; the run folder keeps it in that form.
 
 mod checks;
+mod comments;
 mod conversion;
 mod difference;
 mod overrides;
 mod reading;
 #[cfg(test)]
 mod reading_tests;
+mod robust;
 
 use std::path::PathBuf;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use comments::{Comment, in_lines};
 pub use difference::{Difference, differences};
 pub use overrides::Override;
 pub use reading::{read, read_text};
@@ -42,6 +45,9 @@ pub struct Experiment {
     /// What is written while it learns. Has no influence on what is learned.
     #[serde(default)]
     pub output: Output,
+    /// Words on values, for the file in the run folder. A file that is read has none.
+    #[serde(skip)]
+    pub comments: Vec<Comment>,
 }
 
 fn one() -> u64 {
@@ -121,7 +127,7 @@ pub enum TimeSourceName {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(
     untagged,
-    expecting = "scaling is one of \"none\", \"fit\", { ranges = [[low, high], ...] } or { offset = [...], scale = [...] }"
+    expecting = "scaling is one of \"none\", \"fit\", \"robust\", { ranges = [[low, high], ...] } or { offset = [...], scale = [...] }"
 )]
 pub enum ScalingChoice {
     /// By name.
@@ -140,6 +146,8 @@ pub enum ScalingName {
     None,
     /// Each channel's smallest and largest sample are mapped to -0.8 and 0.8.
     Fit,
+    /// As "fit", but samples far outside of nearly all others do not count: they lie outside of -0.8 to 0.8.
+    Robust,
 }
 
 /// One range for each channel.

@@ -13,6 +13,8 @@ pub struct Override {
     pub value: Value,
     /// The option as it was typed, to show in errors.
     pub typed: String,
+    /// A key beside it that says the same in another way, and goes.
+    pub instead_of: Option<&'static str>,
 }
 
 impl Override {
@@ -20,13 +22,29 @@ impl Override {
     pub fn shorthand(option: &str, key: &str, value: u64) -> Result<Self, String> {
         let number = i64::try_from(value).map_err(|_| format!("{value} is too large for an experiment"))?;
         let path = key.split('.').map(str::to_owned).collect();
-        Ok(Self { path, value: Value::Integer(number), typed: format!("{option} {value}") })
+        Ok(Self { path, value: Value::Integer(number), typed: format!("{option} {value}"), instead_of: None })
     }
 
     /// A shorthand option whose value is text.
     pub fn text(option: &str, key: &str, value: &str) -> Self {
         let path = key.split('.').map(str::to_owned).collect();
-        Self { path, value: Value::String(value.to_owned()), typed: format!("{option} {value}") }
+        Self { path, value: Value::String(value.to_owned()), typed: format!("{option} {value}"), instead_of: None }
+    }
+
+    /// A shorthand option whose value is a number.
+    pub fn number(option: &str, key: &str, value: f64) -> Self {
+        Self { value: Value::Float(value), ..Self::text(option, key, &value.to_string()) }
+    }
+
+    /// A shorthand option whose value is a list of texts.
+    pub fn list(option: &str, key: &str, values: &[String]) -> Self {
+        let value = Value::Array(values.iter().cloned().map(Value::String).collect());
+        Self { value, ..Self::text(option, key, &values.join(",")) }
+    }
+
+    /// The same, in place of what `key` beside it says.
+    pub fn instead_of(self, key: &'static str) -> Self {
+        Self { instead_of: Some(key), ..self }
     }
 
     /// Puts the value in its place.
@@ -46,6 +64,9 @@ impl Override {
                 }
                 other => return Err(format!("`{so_far}` is {}, it has no keys", other.type_str())),
             };
+        }
+        if let Some(other) = self.instead_of {
+            place.remove(other);
         }
         place.insert(last.clone(), self.value.clone());
         Ok(())
@@ -84,7 +105,7 @@ impl FromStr for Override {
         }
         let value = value.trim();
         let value = value.parse::<Value>().unwrap_or_else(|_| Value::String(value.to_owned()));
-        Ok(Self { path, value, typed: format!("--set {text}") })
+        Ok(Self { path, value, typed: format!("--set {text}"), instead_of: None })
     }
 }
 
@@ -103,6 +124,16 @@ mod tests {
     fn a_value_replaces_or_adds_a_key() {
         assert_eq!(applied("training.epochs=7").unwrap()["training"]["epochs"], Value::Integer(7));
         assert_eq!(applied("training.adam.rate=1e-3").unwrap()["training"]["adam"]["rate"], Value::Float(1e-3));
+    }
+
+    #[test]
+    fn an_option_goes_in_place_of_a_key_beside_it() {
+        let mut table: Table = toml::from_str("[data]\ntopics = [\"/a\", \"/b\"]\n").unwrap();
+        Override::text("--topic", "data.topic", "/c").instead_of("topics").apply(&mut table).unwrap();
+        assert_eq!(table["data"].to_string(), "{ topic = \"/c\" }");
+        Override::list("--topic", "data.topics", &["/a".into()]).instead_of("topic").apply(&mut table).unwrap();
+        Override::number("--period", "data.period", 0.5).apply(&mut table).unwrap();
+        assert_eq!(table["data"].to_string(), "{ period = 0.5, topics = [\"/a\"] }");
     }
 
     #[test]

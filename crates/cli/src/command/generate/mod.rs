@@ -47,9 +47,9 @@ pub struct Arguments {
     /// Channels that are fed with recorded samples whatever the mode, by their names
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     open_channels: Vec<String>,
-    /// Start from the state of the K-th learned sequence, counted from 1 [default: all of them, one after the other]
-    #[arg(long, value_name = "K", conflicts_with_all = ["mean", "initial_state"])]
-    sequence: Option<usize>,
+    /// Start from the state of the learned sequence of this name or, counted from 1, number [default: each of them]
+    #[arg(long, value_name = "NAME|K", conflicts_with_all = ["mean", "initial_state"])]
+    sequence: Option<String>,
     /// Start from the mean of the learned initial states
     #[arg(long, conflicts_with = "initial_state")]
     mean: bool,
@@ -108,7 +108,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     let feedback = feedback(arguments, &trained.checkpoint)?;
     let rows = starts::rows(
         (arguments, &trained),
-        shared.engine()?.threads(),
+        (shared, shared.engine()?.threads()),
         feedback.0.iter().any(|channel| channel.sensed > 0.0),
     )?;
     let starts: Vec<Start<'_>> =

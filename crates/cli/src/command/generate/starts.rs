@@ -7,6 +7,7 @@ use scrnn::dataset::Dataset;
 use scrnn::topology::Group;
 
 use super::Arguments;
+use crate::args::Shared;
 use scrnn_data as files;
 use scrnn_run::failure::{Failure, Result};
 use scrnn_run::memory::{self, product};
@@ -35,13 +36,13 @@ struct State {
 
 /// The sequences to generate. `sensing` says whether recorded samples are needed beyond the first; where simulated robots
 /// make them, so many threads are used.
-pub fn rows((arguments, trained): (&Arguments, &Trained), threads: usize, sensing: bool) -> Result<Vec<Row>> {
+pub fn rows((arguments, trained): (&Arguments, &Trained), (shared, threads): (&Shared, usize), sensing: bool) -> Result<Vec<Row>> {
     let checkpoint = &trained.checkpoint;
-    let states = states(arguments, checkpoint)?;
+    let states = states(arguments, trained)?;
     let mut rows = match (&arguments.data, sensing) {
         (Some(path), _) => {
-            let data = files::read_part(path, &arguments.part.of(path, trained.selection()))?;
-            let data = trained.fitted(data, path)?;
+            let data = files::read_all(&[path], &arguments.part.of(path, trained.selection()))?.data;
+            let data = trained.fitted_aloud(data, path, shared)?;
             pair(states, &data, checkpoint)?
         }
         (None, true) => {
@@ -80,7 +81,8 @@ pub fn rows((arguments, trained): (&Arguments, &Trained), threads: usize, sensin
 }
 
 /// The initial states that the options ask for.
-fn states(arguments: &Arguments, checkpoint: &Checkpoint) -> Result<Vec<State>> {
+fn states(arguments: &Arguments, trained: &Trained) -> Result<Vec<State>> {
+    let checkpoint = &trained.checkpoint;
     let learned = &checkpoint.initial_states;
     let of_sequence = |s: usize| State {
         name: checkpoint.sequences[s].clone(),
@@ -93,14 +95,9 @@ fn states(arguments: &Arguments, checkpoint: &Checkpoint) -> Result<Vec<State>> 
     if arguments.mean {
         return Ok(vec![State { name: "mean".to_owned(), values: learned.mean().to_vec(), learned: None }]);
     }
-    let count = checkpoint.sequences.len();
-    match arguments.sequence {
-        Some(k) if (1..=count).contains(&k) => Ok(vec![of_sequence(k - 1)]),
-        Some(k) => {
-            let help = format!("the network learned {count}, counted from 1");
-            Err(Failure::input(format!("there is no learned sequence {k}"), help))
-        }
-        None => Ok((0..count).map(of_sequence).collect()),
+    match &arguments.sequence {
+        Some(wanted) => Ok(vec![of_sequence(trained.sequence(wanted)?)]),
+        None => Ok((0..checkpoint.sequences.len()).map(of_sequence).collect()),
     }
 }
 

@@ -64,7 +64,7 @@ Examples:
 pub struct Arguments {
     /// A run folder or a checkpoint file
     run: PathBuf,
-    /// The sequences to recognise: .csv, .txt, .npy, .npz or .mcap; with --online also `-`, the standard input
+    /// The sequences to recognise: a data file, a folder of them or a pattern; with --online also `-`, the standard input
     data: PathBuf,
     #[command(flatten)]
     part: Part,
@@ -156,7 +156,8 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     let trained = Trained::open(&arguments.run, arguments.best)?;
     let checkpoint = &trained.checkpoint;
     let part = arguments.part.of(&arguments.data, trained.selection());
-    let data = trained.fitted(files::read_part(&arguments.data, &part)?, &arguments.data)?;
+    let data = files::read_all(&[&arguments.data], &part)?.data;
+    let data = trained.fitted_aloud(data, &arguments.data, shared)?;
     data.check_for(&checkpoint.topology)?;
     let delay = checkpoint.topology.delay();
     if let Some(observed) = arguments.observed.filter(|observed| *observed <= delay) {

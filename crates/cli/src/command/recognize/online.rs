@@ -20,6 +20,7 @@ use crate::output::{self, Reader};
 use scrnn_data::{self as files, Field};
 use scrnn_report::Table;
 use scrnn_run::failure::{Ending, Failure, Result};
+use scrnn_run::familiar::{self, Range, Unfamiliar, is_far};
 use scrnn_run::memory::{self, product};
 use scrnn_run::trained::{TOO_FAR, Trained};
 
@@ -39,9 +40,9 @@ pub struct Online {
     /// Channels whose errors are not regressed on
     #[arg(long, alias = "unheeded-channels", value_name = "NAME,...", value_delimiter = ',', requires = "online")]
     masked_channels: Vec<String>,
-    /// Start from the state of the K-th learned sequence, counted from 1 [default: their mean]
-    #[arg(long, value_name = "K", requires = "online")]
-    sequence: Option<usize>,
+    /// Start from the state of the learned sequence of this name or, counted from 1, number [default: their mean]
+    #[arg(long, value_name = "NAME|K", requires = "online")]
+    sequence: Option<String>,
     /// In the JSON object, show window and future at these samples, counted from 1
     #[arg(long, value_name = "K,...", value_delimiter = ',', requires_all = ["online", "json"])]
     at: Vec<usize>,
@@ -79,13 +80,9 @@ impl Online {
 
     fn start<'a>(&self, trained: &'a Trained) -> Result<&'a [f64]> {
         let learned = &trained.checkpoint.initial_states;
-        match self.sequence {
+        match &self.sequence {
             None => Ok(learned.mean()),
-            Some(k) if (1..=learned.sequences()).contains(&k) => Ok(learned.sequence(k - 1)),
-            Some(k) => {
-                let help = format!("the network learned {}, counted from 1", learned.sequences());
-                Err(Failure::input(format!("there is no learned sequence {k}"), help))
-            }
+            Some(wanted) => Ok(learned.sequence(trained.sequence(wanted)?)),
         }
     }
 }
@@ -298,9 +295,8 @@ pub fn run(
         }
         return stream(online, how, &trained, as_json, shared);
     }
-    let data = files::read_part(data, &part.of(data, trained.selection()))
-        .map_err(Failure::from)
-        .and_then(|set| trained.fitted(set, data))?;
+    let set = files::read_all(&[data], &part.of(data, trained.selection()))?.data;
+    let data = trained.fitted_aloud(set, data, shared)?;
     let engine = shared.engine()?;
     let mut followed = Vec::new();
     for sequence in data.sequences() {
@@ -365,7 +361,8 @@ fn stream(online: &Online, how: &How<'_>, trained: &Trained, as_json: bool, shar
     let engine = shared.engine()?;
     let mut lines = Stream::new(BufReader::new(io::stdin()), channels);
     let mut session = Session::new(online, how, trained, &engine)?;
-    let mut warned = Warned::default();
+    let mut warned = Warned { far: vec![false; channels.len()], ..Warned::default() };
+    let known = familiar::learned(trained);
     let mut reader = Reader::Listens;
     if !as_json {
         reader = output::offer(&format!("sample,iterations,milliseconds,{}\n", channels.join(",")))?;
@@ -386,6 +383,9 @@ fn stream(online: &Online, how: &How<'_>, trained: &Trained, as_json: bool, shar
         for &channel in &session.missing {
             warned.missing(lines.line_number(), &channels[channel], sample[channel], shared);
         }
+        for (channel, &value) in sample.iter().enumerate().filter(|(channel, _)| !session.missing.contains(channel)) {
+            warned.far(lines.line_number(), (&channels[channel], channel), (known[channel], value), shared);
+        }
         reader = match (as_json, online.full) {
             (true, true) => output::offer_json_line(&session.told(&done, true, online.ahead))?,
             (true, false) => output::offer_json_line(&session.answer(&done, online.ahead))?,
@@ -401,18 +401,30 @@ fn stream(online: &Online, how: &How<'_>, trained: &Trained, as_json: bool, shar
     Ok(Ending::Done)
 }
 
-/// Warnings about values that are taken as missing: the 1st, 2nd, 4th, 8th, ...
+/// Warnings about values that are taken as missing: the 1st, 2nd, 4th, 8th, ...; and about the first of each channel that is
+/// far from what was learned.
 #[derive(Debug, Default)]
-struct Warned(u64);
+struct Warned {
+    missing: u64,
+    far: Vec<bool>,
+}
 
 impl Warned {
     fn missing(&mut self, line: usize, channel: &str, value: f64, shared: &Shared) {
-        self.0 += 1;
-        if self.0.is_power_of_two() {
+        self.missing += 1;
+        if self.missing.is_power_of_two() {
             let what =
                 if value.is_finite() { format!("{value:e}, far beyond what was learned") } else { "missing".into() };
-            let so_far = if self.0 > 1 { format!(" ({} values so far)", self.0) } else { String::new() };
+            let so_far = if self.missing > 1 { format!(" ({} values so far)", self.missing) } else { String::new() };
             shared.say(format_args!("line {line}, {channel} is {what}: the network's prediction stands in{so_far}",));
+        }
+    }
+
+    fn far(&mut self, line: usize, (name, channel): (&str, usize), (known, value): (Range, f64), shared: &Shared) {
+        if !self.far[channel] && is_far(known, value) {
+            self.far[channel] = true;
+            let what = Unfamiliar { channel: name.to_owned(), learned: known, found: (value, value), units: false };
+            shared.say(format_args!("warning: line {line}: {what}"));
         }
     }
 }

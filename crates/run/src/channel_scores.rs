@@ -1,0 +1,89 @@
+//! How well each channel is predicted one step ahead, in words that need no nats.
+
+use scrnn::dataset::Dataset;
+use scrnn::generation::Generated;
+use scrnn::scaling::Scaling;
+use serde::Serialize;
+
+/// One channel.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ChannelScore {
+    /// Its name.
+    pub channel: String,
+    /// The share of its variance that the predictions explain: 1 if they are right, 0 if the channel's mean does as well, below
+    /// 0 if it does better. None where the channel never changes.
+    pub explained: Option<f64>,
+    /// The root of the mean squared error, in the data's units. None where no sample was observed.
+    pub rmse: Option<f64>,
+}
+
+/// Scores what the open loop predicted of `scaled`. Missing samples are passed over.
+#[must_use]
+pub fn channel_scores(scaled: &Dataset, generated: &[Generated], delay: usize, scaling: &Scaling) -> Vec<ChannelScore> {
+    let n = scaled.channels().len();
+    let pairs = |i: usize| {
+        scaled.sequences().iter().zip(generated).flat_map(move |(sequence, generated)| {
+            let samples = sequence.values().iter().skip(delay * n + i).step_by(n).copied();
+            samples.zip(generated.mean.iter().skip(i).step_by(n).copied()).filter(|(sample, _)| sample.is_finite())
+        })
+    };
+    let score = |(i, channel): (usize, &String)| {
+        let (sum, count) = pairs(i).fold((0.0, 0_usize), |(sum, count), (sample, _)| (sum + sample, count + 1));
+        let mean = sum / count.max(1) as f64;
+        let squares = pairs(i).map(|(sample, y)| (sample - y).powi(2)).sum::<f64>();
+        let spread = pairs(i).map(|(sample, _)| (sample - mean).powi(2)).sum::<f64>();
+        ChannelScore {
+            channel: channel.clone(),
+            explained: Some(1.0 - squares / spread).filter(|share| spread > 0.0 && share.is_finite()),
+            rmse: (count > 0).then(|| (squares / count.max(1) as f64).sqrt() / scaling.scale()[i].abs()),
+        }
+    };
+    scaled.channels().iter().enumerate().map(score).collect()
+}
+
+impl ChannelScore {
+    /// The share in percent.
+    #[must_use]
+    pub fn share(&self) -> String {
+        self.explained.map_or("-".to_owned(), |share| format!("{:.1} %", 100.0 * share))
+    }
+
+    /// The error in four digits.
+    #[must_use]
+    pub fn error(&self) -> String {
+        self.rmse.map_or("-".to_owned(), |rmse| match rmse {
+            0.0 => "0".to_owned(),
+            rmse if (1e-3..1e5).contains(&rmse) => {
+                let digits = (3 - rmse.log10().floor() as i32).max(0) as usize;
+                format!("{rmse:.digits$}")
+            }
+            rmse => format!("{rmse:.3e}"),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scrnn::dataset::Sequence;
+
+    #[test]
+    fn shares_and_errors_are_those_of_the_predicted_samples_in_their_own_units() {
+        // The first sample is what the network starts from.
+        let values = vec![9.0, 9.0, 1.0, 0.5, -1.0, 0.5, 1.0, 0.5, -1.0, 0.5];
+        let data = Dataset::new(
+            vec!["a".into(), "b".into()],
+            vec![Sequence::new("", 2, values).unwrap()],
+        )
+        .unwrap();
+        let mut generated = Generated::default();
+        generated.mean = vec![0.9, 0.5, -1.1, 0.5, 0.9, 0.5, -1.1, 0.5];
+        let scaling = Scaling::new(vec![0.0, 0.0], vec![0.1, 1.0]).unwrap();
+        let scores = channel_scores(&data, &[generated], 1, &scaling);
+        assert!((scores[0].explained.unwrap() - 0.99).abs() < 1e-12 && (scores[0].rmse.unwrap() - 1.0).abs() < 1e-12);
+        assert_eq!((scores[0].share().as_str(), scores[0].error().as_str()), ("99.0 %", "1.000"));
+        // It never changes.
+        assert_eq!((scores[1].explained, scores[1].rmse), (None, Some(0.0)));
+        assert_eq!((scores[1].share().as_str(), scores[1].error().as_str()), ("-", "0"));
+    }
+}
