@@ -189,3 +189,44 @@ fn spikes_do_not_rule_a_robust_scaling() {
     place.ok("train spiked.csv --epochs 2 --set data.scaling=fit --out fit");
     assert!(reach("fit") > 80.0);
 }
+
+#[test]
+fn samples_that_are_missing_are_learned_around() {
+    let place = Place::new();
+    let gaps = |text: &str| {
+        let cell = |(row, line): (usize, &str)| {
+            let mut cells: Vec<&str> = line.split(',').collect();
+            if row > 0 && row % 5 == 0 {
+                cells[2 + row % 2] = ["", "NaN", "null"][row % 3];
+            }
+            cells.join(",") + "\n"
+        };
+        text.lines().enumerate().map(cell).collect::<String>()
+    };
+    place.write("mine.csv", gaps(&table(1.0)));
+    let (said, told) = place.says("train mine.csv --epochs 400");
+    assert!(told.contains("note: channel shoulder: 12 of 120 samples are missing"), "{told}");
+    assert!(said.contains(" %  ") && !said.contains("NaN"), "{said}");
+    let seen = place.json("inspect runs/mine --json");
+    assert!(seen["score"]["nll"].as_f64().is_some(), "{seen}");
+    let found = place.json("recognize runs/mine mine.csv --starts 3 --epochs 30 --json");
+    for (s, one) in found["sequences"].as_array().unwrap().iter().enumerate() {
+        assert_eq!(one["learned"][0]["number"], s + 1, "{one}");
+        assert!(one["error"].as_f64().unwrap() < 0.1 && one["ln_likelihood"].as_f64().is_some(), "{one}");
+    }
+    let along = place.json("generate runs/mine --mode open --data mine.csv --json");
+    assert_eq!(along["sequences"][0]["mean"].as_array().unwrap().len(), 59);
+    let followed = place.json("recognize runs/mine mine.csv --online --json");
+    assert!(followed["sequences"][0]["prediction_error"].as_f64().is_some(), "{followed}");
+    place.ok("report runs/mine");
+    place.ok("inspect mine.csv --plot page.html");
+    assert!(place.text("page.html").contains("12 samples are missing"));
+    let (_, told) = place.fails(2, "train mine.csv --set data.missing=refuse --out other");
+    assert!(told.contains("is missing") || told.contains("is NaN"), "{told}");
+    assert!(told.contains("`missing = \"refuse\"` is set"), "{told}");
+    // A channel that nobody observed is said.
+    place.write("never.csv", "a,b\n".to_owned() + &(0..60).map(|k| format!("{},\n", (f64::from(k) * 0.3).sin())).collect::<String>());
+    let (_, told) = place.says("inspect never.csv --channels a,b");
+    assert!(!told.contains("panicked"), "{told}");
+    assert!(place.ok("inspect never.csv --channels a,b").contains("warning: channel b was never observed"));
+}

@@ -87,7 +87,7 @@ fn a_bad_line_of_data_is_shown() {
     marks(&err, "3,oops");
     assert!(told.contains("bad.csv, line 3"), "{told}");
     place.write("bad.csv", "a,b\n1,2\n3,NaN\n4,5\n");
-    let (err, told) = place.fails(2, "train sine.toml");
+    let (err, told) = place.fails(2, "train sine.toml --set data.missing=refuse");
     marks(&err, "3,NaN");
     assert!(told.contains("sequence 1, step 2, channel b"), "{told}");
 }

@@ -140,14 +140,11 @@ pub enum Missing {
     Refuse,
 }
 
-/// Whether a data set can hold missing values. Until it can, they are refused whatever the policy.
-const KNOWN_TO_DATASETS: bool = false;
-
 impl Selection {
     /// Whether a missing value is an error.
     #[must_use]
     pub fn refuses_missing(&self) -> bool {
-        !KNOWN_TO_DATASETS || self.missing == Missing::Refuse
+        self.missing == Missing::Refuse
     }
 
     /// Whether rows and messages are steps, whatever their clocks say.

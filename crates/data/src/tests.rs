@@ -138,10 +138,11 @@ fn the_arrays_of_an_archive_are_its_sequences() {
     assert_eq!(message(&[("notes.txt", b"hello".to_vec())]), "x.npz, array `notes.txt`: this is not a numpy array");
     assert_eq!(message(&[("a.npy", b"hello".to_vec())]), "x.npz, array `a.npy`: this is not a numpy array");
     assert_eq!(message(&[]), "x.npz holds no samples; needed: at least one");
-    assert_eq!(
-        message(&[("a.npy", npy::array_bytes(&[2, 2], [1.0, 2.0, 3.0, f64::NAN].into_iter()))]),
-        "x.npz: sequence a, step 2, channel y2 is NaN"
-    );
+    let missing = archive(&[("a.npy", npy::array_bytes(&[2, 2], [1.0, 2.0, 3.0, f64::NAN].into_iter()))]);
+    let refuse = Selection { missing: Missing::Refuse, ..Selection::default() };
+    let error = parse_as(Path::new("x.npz"), &missing, &refuse).unwrap_err();
+    assert_eq!(error.to_string(), "x.npz: sequence a, step 2, channel y2 is NaN");
+    assert_eq!(parse_as(Path::new("x.npz"), &missing, &Selection::default()).unwrap().missing(), 1);
 }
 
 /// A generator of garbage that needs no crate (splitmix64).

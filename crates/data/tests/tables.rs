@@ -210,8 +210,12 @@ fn headers_of_several_lines_are_joined() {
     let sure = with("20-deeplabcut/videoDLC.csv", channels(&["hand.likelihood"])).unwrap();
     assert_eq!(first(&sure), [0.9836]);
     // The marker is lost in line 38.
-    let (message, _) = refused("22-optitrack/take.csv", Selection::default());
+    let strict = Selection { missing: scrnn_data::Missing::Refuse, ..Selection::default() };
+    let (message, _) = refused("22-optitrack/take.csv", strict);
     assert!(message.contains("line 38: sequence 1, step 31, channel Rotation.X is missing"), "{message}");
+    let lost = read("22-optitrack/take.csv");
+    assert!(lost.data.missing() > 0 && lost.data.sequences()[0].sample(30)[0].is_nan());
+    assert!(says(&lost, "channel Rotation.X: "));
 }
 
 #[test]

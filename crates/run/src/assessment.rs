@@ -78,15 +78,18 @@ pub fn open_loop(network: &Network, states: &[&[f64]], data: &Dataset, engine: &
 }
 
 impl Predictions {
-    /// Of what the open loop predicted on `data`.
+    /// Of what the open loop predicted on `data`. Missing samples are passed over.
     pub fn of(generated: &[Generated], data: &Dataset, delay: usize) -> Self {
         let n = data.channels().len();
         let (mut errors, mut variances) = (Vec::new(), Vec::new());
         for (generated, sequence) in generated.iter().zip(data.sequences()) {
             let count = (sequence.len() - delay) * n;
             let targets = &sequence.values()[delay * n..];
-            errors.extend(targets.iter().zip(&generated.mean[..count]).map(|(target, y)| target - y));
-            variances.extend(generated.variance.iter().take(count));
+            let there = |k: &usize| !targets[*k].is_nan();
+            errors.extend((0..count).filter(there).map(|k| targets[k] - generated.mean[k]));
+            if !generated.variance.is_empty() {
+                variances.extend((0..count).filter(there).map(|k| generated.variance[k]));
+            }
         }
         Self { errors, variances }
     }
@@ -104,7 +107,7 @@ impl Assessment {
     pub fn new(data: &Dataset, learned: &Predictions, held_out: Option<&Predictions>, delay: usize) -> Self {
         let judged = held_out.unwrap_or(learned);
         let has_variance = !judged.variances.is_empty();
-        let baseline = |model, nll| Baseline { model, nll };
+        let baseline = |model, nll: Option<f64>| Baseline { model, nll: nll.filter(|nll| nll.is_finite()) };
         Self {
             nll: learned.nll(),
             nll_held_out: held_out.and_then(Predictions::nll),

@@ -1,6 +1,7 @@
 //! How well each channel is predicted one step ahead, in words that need no nats.
 
 use scrnn::dataset::Dataset;
+use scrnn::evaluation::half_mean_squared_error;
 use scrnn::generation::Generated;
 use scrnn::scaling::Scaling;
 use serde::Serialize;
@@ -41,6 +42,14 @@ pub fn channel_scores(scaled: &Dataset, generated: &[Generated], delay: usize, s
     scaled.channels().iter().enumerate().map(score).collect()
 }
 
+/// (3.5) over the samples that were observed: half their mean squared error. NaN where none was.
+#[must_use]
+pub fn observed_error(samples: &[f64], means: &[f64]) -> f64 {
+    let pairs = samples.iter().zip(means).filter(|(sample, _)| !sample.is_nan());
+    let (samples, means): (Vec<f64>, Vec<f64>) = pairs.map(|(sample, mean)| (*sample, *mean)).unzip();
+    half_mean_squared_error(&samples, &means)
+}
+
 impl ChannelScore {
     /// The share in percent.
     #[must_use]
@@ -66,6 +75,20 @@ impl ChannelScore {
 mod tests {
     use super::*;
     use scrnn::dataset::Sequence;
+
+    #[test]
+    fn what_is_missing_counts_neither_as_right_nor_as_wrong() {
+        assert_eq!(observed_error(&[1.0, f64::NAN, 3.0], &[0.0, 5.0, 3.0]), 0.25);
+        let data = Dataset::new(
+            vec!["a".into()],
+            vec![Sequence::new("", 1, vec![0.0, 1.0, f64::NAN, -1.0]).unwrap()],
+        )
+        .unwrap();
+        let mut generated = Generated::default();
+        generated.mean = vec![1.0, 7.0, -1.0];
+        let scores = channel_scores(&data, &[generated], 1, &Scaling::identity(1));
+        assert_eq!((scores[0].explained, scores[0].rmse), (Some(1.0), Some(0.0)));
+    }
 
     #[test]
     fn shares_and_errors_are_those_of_the_predicted_samples_in_their_own_units() {

@@ -175,7 +175,7 @@ impl From<scrnn::error::Error> for Failure {
         match error {
             Error::NotFinite { sequence, step, channel, value } => Self::input(
                 format!("sequence {}, sample {}, channel {channel} is {value}", sequence + 1, step + 1),
-                "every sample must be a finite number; missing samples are not supported",
+                "every sample must be a finite number; one that is missing is NaN",
             ),
             Error::SequenceTooShort { sequence, length, delay } => Self::input(
                 format!(

@@ -106,7 +106,7 @@ impl Trained {
     }
 
     /// `data`, from the file at `path`, on the channels that were learned and in their order (see [`channels::matched`]),
-    /// checked to be numbers that the network can be given.
+    /// checked to be numbers that the network can be given. Missing values are.
     ///
     /// # Errors
     /// [`Failure::Input`] for channels that do not match, and for samples far outside of what was learned.
@@ -116,7 +116,7 @@ impl Trained {
         let scaled = self.checkpoint.scaling.apply(&data);
         let n = learned.len();
         for sequence in scaled.sequences() {
-            if let Some(at) = sequence.values().iter().position(|value| value.abs() >= TOO_FAR || value.is_nan()) {
+            if let Some(at) = sequence.values().iter().position(|value| value.abs() >= TOO_FAR) {
                 let (name, step, channel) = (&sequence.name, at / n + 1, &learned[at % n]);
                 let message = format!(
                     "{}: sequence {name}, step {step}, channel {channel} lies {:e} times as far out as anything that was learned",

@@ -127,9 +127,12 @@ impl ConstantModel {
         let n = scaled.channels().len();
         let predicted = scaled.sequences().iter().map(|s| Sequence::new("", n, s.values()[delay * n..].to_vec()));
         let predicted = Dataset::new(scaled.channels().to_vec(), predicted.collect::<scrnn::error::Result<_>>()?)?;
-        let variances: Vec<f64> = predicted.channel_moments().into_iter().map(|(_, variance)| variance).collect();
-        let nll = variances.iter().map(|&variance| gaussian_entropy(variance)).sum::<f64>() / n as f64;
-        Ok(Self { nll: Some(nll).filter(|nll| nll.is_finite()), mse: variances.iter().sum::<f64>() / n as f64 })
+        let moments = predicted.channel_moments().into_iter().map(|(_, variance)| variance);
+        // A channel that was never observed counts nowhere.
+        let variances: Vec<f64> = moments.filter(|variance| !variance.is_nan()).collect();
+        let count = variances.len().max(1) as f64;
+        let nll = variances.iter().map(|&variance| gaussian_entropy(variance)).sum::<f64>() / count;
+        Ok(Self { nll: Some(nll).filter(|nll| nll.is_finite()), mse: variances.iter().sum::<f64>() / count })
     }
 }
 

@@ -184,7 +184,11 @@ impl Table<'_> {
         } else {
             let (sequence, sample) = assembly.place(bad.row);
             let found = if bad.found.is_empty() { "missing".to_owned() } else { bad.found };
-            let help = "every sample must be a finite number; missing samples are not supported".to_owned();
+            let help = match bad.value {
+                Value::Missing => "`missing = \"refuse\"` is set: without it, what is missing is learned around",
+                _ => "every sample must be a finite number; one that is missing is empty or NaN",
+            };
+            let help = help.to_owned();
             (LineProblem::NotFinite { sequence: shortened(sequence), sample, channel, found }, Some(help))
         };
         Some(self.error(bad.line, bad.span, problem, help))

@@ -114,17 +114,51 @@ fn a_field_that_is_no_number_is_shown() {
 fn a_typing_error_in_the_first_line_does_not_make_it_a_header() {
     let (message, marked) = complaint("0.5,1.5x\n1,2\n");
     assert_eq!((message.as_str(), marked.as_str()), ("data.csv, line 1: `1.5x` in column y2 is not a number", "1.5x"));
-    let (message, _) = complaint(",0.5\n1,2\n");
-    assert_eq!(message, "data.csv, line 1: sequence 1, step 1, channel y1 is missing");
+    let first = read_text(",0.5\n1,2\n").unwrap().sequences()[0].values().to_vec();
+    assert!(first[0].is_nan() && first[1..] == [0.5, 1.0, 2.0], "{first:?}");
 }
 
 #[test]
-fn a_missing_or_infinite_sample_is_named_by_its_place() {
-    for (field, found) in [("nan", "nan"), ("", "missing"), ("-inf", "-inf"), ("1e999", "1e999"), ("NA", "NA")] {
-        let (message, marked) = complaint(&format!("sequence,a,b\nx,1,2\nw,3,4\nw,5,{field}\n"));
-        assert_eq!(message, format!("data.csv, line 4: sequence w, step 2, channel b is {found}"));
+fn an_infinite_sample_is_named_by_its_place_and_a_missing_one_where_it_is_refused() {
+    let text = |field: &str| format!("sequence,a,b\nx,1,2\nw,3,4\nw,5,{field}\n");
+    for field in ["-inf", "1e999"] {
+        let (message, marked) = complaint(&text(field));
+        assert_eq!(message, format!("data.csv, line 4: sequence w, step 2, channel b is {field}"));
         assert_eq!(marked, field);
     }
+    let refuse = Selection { missing: crate::Missing::Refuse, ..Selection::default() };
+    for (field, found) in [("nan", "nan"), ("", "missing"), ("NA", "NA")] {
+        let read = |selection: &Selection| {
+            crate::inspect_bytes(std::path::Path::new("data.csv"), text(field).as_bytes(), selection)
+        };
+        let message = read(&refuse).unwrap_err().to_string();
+        assert_eq!(message, format!("data.csv, line 4: sequence w, step 2, channel b is {found}"));
+        let reading = read(&Selection::default()).unwrap();
+        let values = reading.data.sequences()[1].values();
+        assert!(values[..3] == [3.0, 4.0, 5.0] && values[3].is_nan(), "{values:?}");
+        let told: Vec<String> = reading.remarks.iter().map(ToString::to_string).collect();
+        assert!(told.contains(&"channel b: 1 of 3 samples are missing".to_owned()), "{told:?}");
+    }
+}
+
+#[test]
+fn channels_that_are_missing_by_more_than_half_or_altogether_are_warned_of() {
+    let text = "a,b,c\n1,,NaN\n2,,NaN\n3,5,NaN\n4,6,NaN\n5,,NaN\n";
+    let selection = Selection { channels: Some(["a", "b", "c"].map(str::to_owned).to_vec()), ..Selection::default() };
+    let reading = crate::inspect_bytes(std::path::Path::new("data.csv"), text.as_bytes(), &selection).unwrap();
+    let warned: Vec<String> = reading
+        .remarks
+        .iter()
+        .filter(|remark| remark.level() == crate::Level::Warning)
+        .map(ToString::to_string)
+        .collect();
+    assert_eq!(
+        warned,
+        [
+            "channel b: 3 of 5 samples are missing",
+            "channel c was never observed: all its samples are missing"
+        ]
+    );
 }
 
 #[test]

@@ -104,6 +104,7 @@ fn check_data(data: &Data) -> Check {
                 ("arrays", data.arrays.is_some()),
                 ("axes", data.axes.is_some()),
                 ("unwrap", data.unwrap.is_some()),
+                ("missing", data.missing.is_some()),
                 ("period", data.period.is_some()),
                 ("channels", data.channels.is_some()),
             ];

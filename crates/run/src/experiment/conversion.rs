@@ -9,11 +9,11 @@ use scrnn::scaling::Scaling;
 use scrnn::topology::{Prediction, Topology};
 
 use super::{
-    Data, Experiment, MeanUnits, OptimiserName, ScalingChoice, ScalingConstants, ScalingName, ScalingRanges, SkipName,
+    Data, Experiment, MeanUnits, MissingName, OptimiserName, ScalingChoice, ScalingConstants, ScalingName, ScalingRanges, SkipName,
     TaskName, TimeSourceName, Training, robust,
 };
 use crate::failure::{Failure, Result};
-use scrnn_data::{Selection, TimeSource};
+use scrnn_data::{Missing, Selection, TimeSource};
 
 /// Default share of the last change.
 const DAMPING: f64 = 0.7;
@@ -128,6 +128,10 @@ impl Data {
             arrays: self.arrays.clone().unwrap_or_default(),
             axes: self.axes.as_ref().and_then(|axes| axes.parse().ok()),
             unwrap: self.unwrap.clone().unwrap_or_default(),
+            missing: match self.missing {
+                Some(MissingName::Refuse) => Missing::Refuse,
+                Some(MissingName::Accept) | None => Missing::Accept,
+            },
             ..Selection::default()
         }
     }

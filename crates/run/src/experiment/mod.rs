@@ -103,6 +103,10 @@ pub struct Data {
     /// Names of the channels to learn, in this order. Default: all that the files have.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub channels: Option<Vec<String>>,
+    /// What is done about missing samples (NaN, empty cells, null): "accept" learns around them, "refuse" ends with an error.
+    /// Default: "accept".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub missing: Option<MissingName>,
     /// How samples are brought into the reach of the mean units, which is -1 to 1. Default: "fit" for files and robots,
     /// "none" for other tasks.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -121,6 +125,16 @@ pub enum TimeSourceName {
     Log,
     /// Nothing: rows and messages are steps.
     Rows,
+}
+
+/// What is done about missing samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum MissingName {
+    /// They do not count, and the network's own prediction stands in for them as an input.
+    Accept,
+    /// They are an error.
+    Refuse,
 }
 
 /// How samples are scaled.

@@ -14,7 +14,6 @@ use std::path::PathBuf;
 use clap::Args;
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::engine::Engine;
-use scrnn::evaluation::half_mean_squared_error;
 use scrnn::generation::{Feedback, Generated, GenerationOptions, Start, generate};
 use scrnn::recognition::{Recognition, RecognitionOptions, recognize};
 use serde::Serialize;
@@ -26,6 +25,7 @@ use crate::outputs::check_distinct;
 use online::{How, Online};
 use scrnn_data::{self as files, Field};
 use scrnn_report::Table;
+use scrnn_run::channel_scores::observed_error;
 use scrnn_run::failure::{Ending, Failure, Result};
 use scrnn_run::trained::Trained;
 
@@ -240,12 +240,14 @@ fn summary(
     let checkpoint = &trained.checkpoint;
     let (n, delay) = (checkpoint.channels.len(), checkpoint.topology.delay());
     let heard = heard.min(sequence.len());
+    // What is missing does not count.
+    let terms = sequence.targets(delay, heard - delay).max(1) as f64;
     let per_value =
-        |ln_likelihood: f64| checkpoint.topology.has_variance().then(|| ln_likelihood / ((heard - delay) * n) as f64);
+        |ln_likelihood: f64| checkpoint.topology.has_variance().then(|| ln_likelihood / terms);
     let means = raw_means(trained, generated);
     let error = |samples: std::ops::Range<usize>| {
         let predicted = &means[(samples.start - delay) * n..(samples.end - delay) * n];
-        half_mean_squared_error(&sequence.values()[samples.start * n..samples.end * n], predicted)
+        observed_error(&sequence.values()[samples.start * n..samples.end * n], predicted)
     };
     let best = &recognition.trials[0];
     Found {

@@ -191,7 +191,6 @@ impl<'a> Session<'a> {
     fn observe(&mut self, sample: &[f64]) -> Result<Regression> {
         let scaling = &self.trained.checkpoint.scaling;
         self.missing.clear();
-        let predicts = self.predicts();
         for (channel, (scaled, raw)) in self.scaled.iter_mut().zip(sample).enumerate() {
             let value = scaling.to_scaled(channel, *raw);
             if value.is_finite() && value.abs() < TOO_FAR {
@@ -199,10 +198,8 @@ impl<'a> Session<'a> {
                 continue;
             }
             self.missing.push(channel);
-            // The prediction stands in; before there is one, the value that came last, and 0 before there was any.
-            if predicts {
-                *scaled = self.regression.mean()[channel];
-            }
+            // It does not count; the network's own prediction stands in as an input.
+            *scaled = f64::NAN;
         }
         self.taken += 1;
         let (regression, scaled) = (&mut self.regression, &self.scaled);
@@ -323,8 +320,10 @@ fn follow(online: &Online, how: &How<'_>, trained: &Trained, sequence: &Sequence
         if k >= delay {
             for (i, &y) in session.regression.mean().iter().enumerate() {
                 rows.mean.push(scaling.to_raw(i, y));
-                squares += (scaling.to_raw(i, y) - sample[i]).powi(2);
-                values += 1;
+                if !sample[i].is_nan() {
+                    squares += (scaling.to_raw(i, y) - sample[i]).powi(2);
+                    values += 1;
+                }
             }
             let v = session.regression.variance().iter().enumerate();
             rows.variance.extend(v.map(|(i, &v)| scaling.variance_to_raw(i, v)));
