@@ -133,11 +133,11 @@ fn names(fields: &[Field<'_>]) -> Vec<(String, Vec<String>)> {
     let Some(first) = fields.first() else { return Vec::new() };
     let sequences = first.data.sequences().iter().map(|sequence| sequence.name.clone()).collect();
     let mut all: Vec<(String, Vec<String>)> = vec![(SEQUENCES.to_owned(), sequences)];
-    for field in fields {
+    for (index, field) in fields.iter().enumerate() {
         let channels = field.data.channels();
         let named = channels != Dataset::numbered_channels(channels.len());
         if named && all.iter().skip(1).all(|(_, others)| others != channels) {
-            let own = if all.len() == 1 { String::new() } else { format!("_{}", field.name) };
+            let own = if index == 0 { String::new() } else { format!("_{}", field.name) };
             all.push((format!("{CHANNELS}{own}"), channels.to_vec()));
         }
     }

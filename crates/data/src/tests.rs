@@ -67,7 +67,11 @@ fn fields_stand_side_by_side() {
         let archive = zip::ZipArchive::new(std::io::Cursor::new(&bytes)).unwrap();
         archive.file_names().map(|name| name.unwrap().into_owned()).collect()
     };
-    assert_eq!(names, ["mean_000.npy", "mean_001.npy", "context_000.npy", "context_001.npy"]);
+    let arrays = ["mean_000.npy", "mean_001.npy", "context_000.npy", "context_001.npy"];
+    assert_eq!(names[..4], arrays);
+    assert_eq!(names[4..], ["names_of_sequences.npy", "names_of_channels_context.npy"]);
+    let again = inspect_bytes(Path::new("x.npz"), &bytes, &Selection::default()).unwrap().data;
+    assert_eq!(again.sequences().iter().map(|one| one.name.as_str()).collect::<Vec<_>>(), ["a", "b"]);
     assert_eq!(bytes, npz::write("x.npz", &fields).unwrap());
 }
 

@@ -23,10 +23,10 @@ const SMOOTH: f64 = 0.5;
 pub fn by_rows(samples: &Samples) -> Option<Samples> {
     let [track] = samples.tracks.as_slice() else { return None };
     let width = samples.channels.len();
-    let rows: Vec<&[f64]> = track.values.chunks_exact(width).collect();
-    if samples.facts.named || !track.times.is_empty() || width <= SHORTEST || rows.len() < 2 {
+    if samples.facts.named || !track.times.is_empty() || width <= SHORTEST {
         return None;
     }
+    let rows: Vec<&[f64]> = track.values.chunks_exact(width).collect();
     let mut classes: Vec<i64> = Vec::new();
     for row in &rows {
         let class = row[0];
@@ -40,7 +40,7 @@ pub fn by_rows(samples: &Samples) -> Option<Samples> {
             return None;
         }
     }
-    if 2 * classes.len() > rows.len() || !goes_on_along_rows(&rows) {
+    if rows.len() < 2 || 2 * classes.len() > rows.len() || !goes_on_along_rows(&rows) {
         return None;
     }
     let tracks = rows.iter().enumerate().map(|(index, row)| {
