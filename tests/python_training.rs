@@ -100,8 +100,7 @@ fn bags_of_two_topics_with_joints_in_any_order() {
 #[test]
 fn a_lerobot_data_set() {
     let Some(place) = Place::new() else { return };
-    let channels =
-        ["observation.state.shoulder", "observation.state.elbow", "action.shoulder", "action.elbow"];
+    let channels = ["observation.state.shoulder", "observation.state.elbow", "action.shoulder", "action.elbow"];
     works(&place, "set", "--epochs 1500", "runs/set", (&channels, &["0", "1", "2"]));
 }
 

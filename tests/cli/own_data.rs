@@ -23,7 +23,10 @@ fn data_alone_are_learned_with_settings_that_are_explained() {
     let place = Place::new();
     place.write("mine.csv", table(1.0));
     let (said, told) = place.says("train mine.csv --epochs 300 --seed 2");
-    assert!(told.contains("learns 2 sequences of 60 samples, 50 Hz, channels: shoulder, elbow (from mine.csv)"), "{told}");
+    assert!(
+        told.contains("learns 2 sequences of 60 samples, 50 Hz, channels: shoulder, elbow (from mine.csv)"),
+        "{told}"
+    );
     assert!(told.contains("without an experiment file:") && told.contains("300 epochs"), "{told}");
     assert!(said.contains("shoulder") && said.contains(" %  "), "{said}");
     let text = String::from_utf8(place.read("runs/mine/experiment.toml")).unwrap();
@@ -105,7 +108,10 @@ fn sequences_are_called_by_their_names_in_and_out() {
     place.ok("recognize runs/mine mine.csv --starts 2 --epochs 3 --out states.npz");
     let seen = place.json("inspect states.npz --axes tc --json");
     assert_eq!((&seen["sequences"][1]["name"], &seen["channels"][0]["name"]), (&json!("wave"), &json!("context1")));
-    assert_eq!(place.json("generate runs/mine --initial-state states.npz --steps 2 --json")["sequences"][1]["name"], "wave");
+    assert_eq!(
+        place.json("generate runs/mine --initial-state states.npz --steps 2 --json")["sequences"][1]["name"],
+        "wave"
+    );
 }
 
 #[test]
@@ -178,7 +184,8 @@ fn data_are_drawn_on_a_page_that_needs_nothing_else() {
 #[test]
 fn spikes_do_not_rule_a_robust_scaling() {
     let place = Place::new();
-    let rows: String = (0..400).map(|k| format!("{}\n", if k == 200 { 80.0 } else { (f64::from(k) * 0.3).sin() })).collect();
+    let rows: String =
+        (0..400).map(|k| format!("{}\n", if k == 200 { 80.0 } else { (f64::from(k) * 0.3).sin() })).collect();
     place.write("spiked.csv", format!("angle\n{rows}"));
     let (_, told) = place.says("train spiked.csv --epochs 2");
     assert!(told.contains("1 of 400 samples of channel angle lie outside") && told.contains("\"robust\""), "{told}");
@@ -225,7 +232,10 @@ fn samples_that_are_missing_are_learned_around() {
     assert!(told.contains("is missing") || told.contains("is NaN"), "{told}");
     assert!(told.contains("`missing = \"refuse\"` is set"), "{told}");
     // A channel that nobody observed is said.
-    place.write("never.csv", "a,b\n".to_owned() + &(0..60).map(|k| format!("{},\n", (f64::from(k) * 0.3).sin())).collect::<String>());
+    place.write(
+        "never.csv",
+        "a,b\n".to_owned() + &(0..60).map(|k| format!("{},\n", (f64::from(k) * 0.3).sin())).collect::<String>(),
+    );
     let (_, told) = place.says("inspect never.csv --channels a,b");
     assert!(!told.contains("panicked"), "{told}");
     assert!(place.ok("inspect never.csv --channels a,b").contains("warning: channel b was never observed"));

@@ -370,9 +370,8 @@ fn alone(
         tracks.map(|(s, values)| ((s + 1).to_string(), values.to_vec())).collect()
     };
     let of_sequences = |texts: &Texts| SEQUENCE_NAMES.contains(&texts.name.to_lowercase().as_str());
-    let mut fitting = texts
-        .iter()
-        .filter(|texts| texts.texts.len() == channels && distinct(&texts.texts) && !of_sequences(texts));
+    let mut fitting =
+        texts.iter().filter(|texts| texts.texts.len() == channels && distinct(&texts.texts) && !of_sequences(texts));
     Ok(match (fitting.next(), fitting.next()) {
         (Some(names), None) if channels > 1 || names.name.to_lowercase().contains("name") => {
             remarks.push(Remark::Understood { what: format!("the channels' names are those in `{}`", names.name) });

@@ -93,7 +93,9 @@ pub enum FileError {
 
     /// An array with a value that is NaN or infinite.
     #[error("{path}: sequence {sequence}, step {sample}, channel {channel} is {value}")]
-    #[diagnostic(help("every sample must be a finite number; a missing one is NaN, empty or null, unless `missing = \"refuse\"` is set"))]
+    #[diagnostic(help(
+        "every sample must be a finite number; a missing one is NaN, empty or null, unless `missing = \"refuse\"` is set"
+    ))]
     NotFinite {
         /// The file.
         path: String,

@@ -58,8 +58,7 @@ fn figure(reading: &Reading, channel: usize, channels: usize) -> Block {
     let (mut series, mut missing, mut gaps) = (Vec::new(), Vec::new(), Vec::new());
     for (place, sequence) in data.sequences().iter().enumerate().step_by(every) {
         let label = if count <= NAMED { sequence.name.clone() } else { String::new() };
-        let values: Vec<f64> =
-            sequence.values().iter().skip(channel).step_by(data.channels().len()).copied().collect();
+        let values: Vec<f64> = sequence.values().iter().skip(channel).step_by(data.channels().len()).copied().collect();
         for run in runs(&values) {
             let thin = thinned(&values[run.clone()], pieces);
             let points: Vec<(f64, f64)> =
@@ -71,9 +70,14 @@ fn figure(reading: &Reading, channel: usize, channels: usize) -> Block {
             });
         }
         missing.extend((0..values.len()).filter(|&step| !values[step].is_finite()).map(|step| at(step as f64)));
-        gaps.extend(reading.facts.gaps.iter().filter(|gap| gap.sequence == sequence.name).map(|gap: &Gap| {
-            at(gap.after as f64 - 0.5)
-        }));
+        gaps.extend(
+            reading
+                .facts
+                .gaps
+                .iter()
+                .filter(|gap| gap.sequence == sequence.name)
+                .map(|gap: &Gap| at(gap.after as f64 - 0.5)),
+        );
     }
     let mut panel = Panel::spanning("", series);
     let (bottom, top) = panel.y;

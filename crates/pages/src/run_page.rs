@@ -95,7 +95,9 @@ fn channel_sheet(scores: &[ChannelScore]) -> Block {
         caption: "Each channel, one step ahead".into(),
         head: ["channel", "variance explained", "rms error"].map(String::from).to_vec(),
         rows: scores.iter().map(row).collect(),
-        note: "Errors are in the data's units. 100 % would be right throughout; at 0 % the channel's mean does as well.".into(),
+        note:
+            "Errors are in the data's units. 100 % would be right throughout; at 0 % the channel's mean does as well."
+                .into(),
     })
 }
 

@@ -79,11 +79,8 @@ mod tests {
     #[test]
     fn what_is_missing_counts_neither_as_right_nor_as_wrong() {
         assert_eq!(observed_error(&[1.0, f64::NAN, 3.0], &[0.0, 5.0, 3.0]), 0.25);
-        let data = Dataset::new(
-            vec!["a".into()],
-            vec![Sequence::new("", 1, vec![0.0, 1.0, f64::NAN, -1.0]).unwrap()],
-        )
-        .unwrap();
+        let data = Dataset::new(vec!["a".into()], vec![Sequence::new("", 1, vec![0.0, 1.0, f64::NAN, -1.0]).unwrap()])
+            .unwrap();
         let mut generated = Generated::default();
         generated.mean = vec![1.0, 7.0, -1.0];
         let scores = channel_scores(&data, &[generated], 1, &Scaling::identity(1));
@@ -94,11 +91,7 @@ mod tests {
     fn shares_and_errors_are_those_of_the_predicted_samples_in_their_own_units() {
         // The first sample is what the network starts from.
         let values = vec![9.0, 9.0, 1.0, 0.5, -1.0, 0.5, 1.0, 0.5, -1.0, 0.5];
-        let data = Dataset::new(
-            vec!["a".into(), "b".into()],
-            vec![Sequence::new("", 2, values).unwrap()],
-        )
-        .unwrap();
+        let data = Dataset::new(vec!["a".into(), "b".into()], vec![Sequence::new("", 2, values).unwrap()]).unwrap();
         let mut generated = Generated::default();
         generated.mean = vec![0.9, 0.5, -1.1, 0.5, 0.9, 0.5, -1.1, 0.5];
         let scaling = Scaling::new(vec![0.0, 0.0], vec![0.1, 1.0]).unwrap();

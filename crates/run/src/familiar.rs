@@ -55,7 +55,6 @@ fn shown((low, high): Range) -> String {
 }
 
 fn number(value: f64) -> String {
-
     let size = value.abs();
     if size != 0.0 && !(1e-3..1e6).contains(&size) {
         return format!("{value:.3e}");
@@ -143,7 +142,10 @@ mod tests {
         assert_eq!(told(&[(-1.0, 1.0)], &[-1.5, 1.9]), [""; 0]);
         let far = told(&[(-1.0, 1.0), (0.0, 5.0)], &[0.25, 3.0, 2.5, 4.0]);
         assert_eq!(far.len(), 1);
-        assert!(far[0].starts_with("channel y1 reaches 0.25 to 2.5, and -1 to 1 was learned: the network does not"), "{far:?}");
+        assert!(
+            far[0].starts_with("channel y1 reaches 0.25 to 2.5, and -1 to 1 was learned: the network does not"),
+            "{far:?}"
+        );
         assert!(told(&[(-1.0, 1.0)], &[-120.0, 100.0])[0].contains("-120 to 100"));
         // A channel that stood still.
         assert!(told(&[(2.0, 2.0)], &[2.5, 2.6]).is_empty());

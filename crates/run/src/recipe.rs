@@ -48,18 +48,24 @@ pub fn choose(data: &Dataset) -> Recipe {
 
     let spikes = look(data).iter().any(|one| matches!(one, Suspicion::Spikes { .. }));
     let scaling = if spikes { ScalingName::Robust } else { ScalingName::Fit };
-    because("data.scaling", match spikes {
-        true => "There are spikes: they are left out when the range of a channel is measured.".to_owned(),
-        false => "Each channel fills the range that the network can predict.".to_owned(),
-    });
+    because(
+        "data.scaling",
+        match spikes {
+            true => "There are spikes: they are left out when the range of a channel is measured.".to_owned(),
+            false => "Each channel fills the range that the network can predict.".to_owned(),
+        },
+    );
 
     because("network.delay", "The next sample is predicted from this one.".to_owned());
     let still = still_channels(data, DELAY);
     let variance_floor = if still.is_empty() { 1e-5 } else { 1e-4 };
-    because("network.variance_floor", match still.as_slice() {
-        [] => "No variance is predicted below this (scaled units): smooth data have none to speak of.".to_owned(),
-        still => format!("{} never changes: without a floor its likelihood has no bound.", still.join(", ")),
-    });
+    because(
+        "network.variance_floor",
+        match still.as_slice() {
+            [] => "No variance is predicted below this (scaled units): smooth data have none to speak of.".to_owned(),
+            still => format!("{} never changes: without a floor its likelihood has no bound.", still.join(", ")),
+        },
+    );
     because(
         "network.initial_state_variance",
         "Each sequence finds an initial state of its own, by which it is told from the others.".to_owned(),
@@ -71,10 +77,13 @@ pub fn choose(data: &Dataset) -> Recipe {
         format!("For {sequences} sequences on {channels} channels, and no more than {samples} samples can teach."),
     );
     let (period, time_constant) = pace(data);
-    because("network.groups.time_constant", match period {
-        Some(period) => format!("In steps. The data swing about once in {period:.0} steps."),
-        None => "In steps.".to_owned(),
-    });
+    because(
+        "network.groups.time_constant",
+        match period {
+            Some(period) => format!("In steps. The data swing about once in {period:.0} steps."),
+            None => "In steps.".to_owned(),
+        },
+    );
 
     let work = samples as f64 * ((units * units + 3 * units * channels) as f64) * WORK;
     let epochs = rounded((BUDGET / work).clamp(EPOCHS.0, EPOCHS.1));
@@ -123,7 +132,8 @@ fn period(data: &Dataset, channel: usize) -> Option<f64> {
     let n = data.channels().len();
     let (mut squares, mut steps, mut spread, mut count) = (0.0, 0_usize, 0.0, 0_usize);
     for sequence in data.sequences() {
-        let values = |sequence: &Sequence| sequence.values().iter().skip(channel).step_by(n).copied().collect::<Vec<_>>();
+        let values =
+            |sequence: &Sequence| sequence.values().iter().skip(channel).step_by(n).copied().collect::<Vec<_>>();
         let values = values(sequence);
         let there = || values.iter().copied().filter(|value| value.is_finite());
         let mean = there().sum::<f64>() / there().count().max(1) as f64;

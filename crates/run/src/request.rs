@@ -135,7 +135,9 @@ fn is_text(path: &Path) -> bool {
     use std::io::Read as _;
     let mut begin = Vec::new();
     let read = std::fs::File::open(path).and_then(|file| file.take(512).read_to_end(&mut begin));
-    read.is_ok() && !begin.contains(&0) && String::from_utf8_lossy(&begin).chars().filter(|c| *c == '\u{fffd}').count() < 2
+    read.is_ok()
+        && !begin.contains(&0)
+        && String::from_utf8_lossy(&begin).chars().filter(|c| *c == '\u{fffd}').count() < 2
 }
 
 /// An experiment for data without one. A run that goes on keeps the experiment that it began with.
@@ -166,7 +168,8 @@ fn alone(files: &[PathBuf], overrides: &[Override], out: Option<&Path>, resume: 
     let scaling = first.data.scaling.clone().unwrap_or(ScalingChoice::Named(scaling));
     let data = Data { scaling: Some(scaling), ..first.data };
     let chosen = Experiment { name, data, network, training, ..recipe::bare() };
-    let mut experiment = experiment::read_text("the experiment", &chosen.to_file(), overrides)?.resolved(Path::new(""))?;
+    let mut experiment =
+        experiment::read_text("the experiment", &chosen.to_file(), overrides)?.resolved(Path::new(""))?;
     let given = |key: &str| overrides.iter().any(|change| plain(&change.path) == key);
     experiment.comments = reasons;
     for comment in experiment.comments.iter_mut().filter(|comment| given(&comment.key)) {
@@ -195,9 +198,9 @@ fn name_for(files: &[PathBuf]) -> String {
     let name = match files {
         [only] if is_pattern(only) => folder(only),
         // A folder is called as it is, and `.` by what it stands for.
-        [only] if only.is_dir() => std::path::absolute(only).ok().and_then(|path| {
-            path.file_name().map(|name| name.to_string_lossy().into_owned())
-        }),
+        [only] if only.is_dir() => std::path::absolute(only)
+            .ok()
+            .and_then(|path| path.file_name().map(|name| name.to_string_lossy().into_owned())),
         [only] => stem(only),
         [first, others @ ..] => match others.iter().all(|other| other.parent() == first.parent()) {
             true => folder(first).or_else(|| stem(first)),
@@ -258,7 +261,8 @@ mod tests {
         let rows: String = (0..60).map(|k| format!("{},{}\n", (f64::from(k) * 0.3).sin(), f64::from(k % 7))).collect();
         std::fs::write(&file, format!("a,b\n{rows}")).unwrap();
         let set = |text: &str| text.parse::<Override>().unwrap();
-        let overrides = [set("network.groups.context.units=9"), set("data.channels=[\"a\"]"), set("training.epochs=12")];
+        let overrides =
+            [set("network.groups.context.units=9"), set("data.channels=[\"a\"]"), set("training.epochs=12")];
         let asked = Request::Files(vec![file.clone()]).experiment(&overrides, None, false).unwrap();
         let experiment = &asked.experiment;
         assert_eq!((experiment.network.groups[0].units, experiment.training.epochs), (9, 12));

@@ -110,7 +110,10 @@ impl Verdict {
     fn write_channels(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let names = self.channels.iter().take(SHOWN).map(|score| score.channel.chars().count());
         let width = names.max().unwrap_or(0);
-        writeln!(f, "One step ahead, the share of each channel's variance that is explained, and the rms error in its own units:")?;
+        writeln!(
+            f,
+            "One step ahead, the share of each channel's variance that is explained, and the rms error in its own units:"
+        )?;
         for score in self.channels.iter().take(SHOWN) {
             writeln!(f, "  {:width$}  {:>8}  {}", score.channel, score.share(), score.error())?;
         }

@@ -44,7 +44,10 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     check_distinct(&[("--plot", arguments.plot.as_deref())], &[("PATH", Some(path))])?;
     let (object, text) = if is_run || is_checkpoint {
         if arguments.plot.is_some() {
-            return Err(Failure::input("--plot draws data, and this is a network", "`scrnn report` makes a page of a run"));
+            return Err(Failure::input(
+                "--plot draws data, and this is a network",
+                "`scrnn report` makes a page of a run",
+            ));
         }
         let trained = Trained::open(path, false)?;
         (network_object(&trained), network_text(&trained, path))

@@ -64,9 +64,8 @@ pub fn by_rows(samples: &Samples) -> Option<Samples> {
 fn goes_on_along_rows(rows: &[&[f64]]) -> bool {
     let along = roughness(rows.iter().map(|row| row[1..].iter().copied().filter(|value| value.is_finite())));
     let width = rows[0].len();
-    let down = roughness(
-        (1..width).map(|column| rows.iter().map(move |row| row[column]).filter(|value| value.is_finite())),
-    );
+    let down =
+        roughness((1..width).map(|column| rows.iter().map(move |row| row[column]).filter(|value| value.is_finite())));
     along < SMOOTH && along < 0.5 * down
 }
 

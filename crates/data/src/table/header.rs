@@ -164,7 +164,9 @@ impl Layout {
         self.named = true;
         self.header = Some(last.text.to_owned());
         self.rate = markers::rate(above);
-        if let Some(listed) = count.filter(|count| trimmed(names) != *count).and_then(|count| markers::names(above, count)) {
+        if let Some(listed) =
+            count.filter(|count| trimmed(names) != *count).and_then(|count| markers::names(above, count))
+        {
             let what = "the columns are called after the markers in the lines above".to_owned();
             self.remarks.push(Remark::Understood { what });
             self.columns = listed.into_iter().map(|name| column(Some(name))).collect();

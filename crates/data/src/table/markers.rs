@@ -97,7 +97,12 @@ mod tests {
         let header = "Frame\tTime\thip X\thip Y\thip Z\tknee X\tknee Y\tknee Z\n";
         for text in [format!("{head}{header}{timed}"), format!("{head}{timed}")] {
             let reading = read("walk.tsv", &text);
-            assert_eq!((reading.data.channels().len(), reading.period), (6, Some(0.02)), "{:?}", reading.data.channels());
+            assert_eq!(
+                (reading.data.channels().len(), reading.period),
+                (6, Some(0.02)),
+                "{:?}",
+                reading.data.channels()
+            );
             assert!(reading.data.channels()[3].starts_with("knee"), "{:?}", reading.data.channels());
             assert_eq!(reading.data.sequences()[0].sample(3), [3.5, 2.0, 3.0, 3.25, 5.0, 6.5]);
         }

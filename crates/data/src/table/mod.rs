@@ -76,7 +76,10 @@ fn read(source: &Source<'_>, order: DetectionOrder, selection: &Selection) -> Re
     // What is no number at all is a typing error, and is shown.
     let typed = bad.iter().all(|[_, other]| other.is_none());
     if typed && !layout.named && !asked && selection.period.is_none() && !selection.ignores_time() {
-        source.budget().take_values::<f64>(assembly.samples.tracks.iter().map(|one| one.values.len()).sum()).map_err(over)?;
+        source
+            .budget()
+            .take_values::<f64>(assembly.samples.tracks.iter().map(|one| one.values.len()).sum())
+            .map_err(over)?;
         if let Some(samples) = classes::by_rows(&assembly.samples) {
             return Ok(samples);
         }

@@ -154,10 +154,7 @@ fn channels_that_are_missing_by_more_than_half_or_altogether_are_warned_of() {
         .collect();
     assert_eq!(
         warned,
-        [
-            "channel b: 3 of 5 samples are missing",
-            "channel c was never observed: all its samples are missing"
-        ]
+        ["channel b: 3 of 5 samples are missing", "channel c was never observed: all its samples are missing"]
     );
 }
 

@@ -9,8 +9,8 @@ use scrnn::scaling::Scaling;
 use scrnn::topology::{Prediction, Topology};
 
 use super::{
-    Data, Experiment, MeanUnits, MissingName, OptimiserName, ScalingChoice, ScalingConstants, ScalingName, ScalingRanges, SkipName,
-    TaskName, TimeSourceName, Training, robust,
+    Data, Experiment, MeanUnits, MissingName, OptimiserName, ScalingChoice, ScalingConstants, ScalingName,
+    ScalingRanges, SkipName, TaskName, TimeSourceName, Training, robust,
 };
 use crate::failure::{Failure, Result};
 use scrnn_data::{Missing, Selection, TimeSource};

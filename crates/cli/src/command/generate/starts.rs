@@ -36,7 +36,11 @@ struct State {
 
 /// The sequences to generate. `sensing` says whether recorded samples are needed beyond the first; where simulated robots
 /// make them, so many threads are used.
-pub fn rows((arguments, trained): (&Arguments, &Trained), (shared, threads): (&Shared, usize), sensing: bool) -> Result<Vec<Row>> {
+pub fn rows(
+    (arguments, trained): (&Arguments, &Trained),
+    (shared, threads): (&Shared, usize),
+    sensing: bool,
+) -> Result<Vec<Row>> {
     let checkpoint = &trained.checkpoint;
     let states = states(arguments, trained)?;
     let mut rows = match (&arguments.data, sensing) {

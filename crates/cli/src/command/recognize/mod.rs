@@ -242,8 +242,7 @@ fn summary(
     let heard = heard.min(sequence.len());
     // What is missing does not count.
     let terms = sequence.targets(delay, heard - delay).max(1) as f64;
-    let per_value =
-        |ln_likelihood: f64| checkpoint.topology.has_variance().then(|| ln_likelihood / terms);
+    let per_value = |ln_likelihood: f64| checkpoint.topology.has_variance().then(|| ln_likelihood / terms);
     let means = raw_means(trained, generated);
     let error = |samples: std::ops::Range<usize>| {
         let predicted = &means[(samples.start - delay) * n..(samples.end - delay) * n];
