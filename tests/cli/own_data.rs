@@ -75,7 +75,7 @@ fn folders_patterns_and_lists_of_files_are_learned_together() {
     let (_, told) = place.fails(2, "train demos --files demos/b.csv");
     assert!(told.contains("data files are given twice"), "{told}");
     let (_, told) = place.fails(4, "train nothing.csv");
-    assert!(told.contains("cannot read nothing.csv"), "{told}");
+    assert!(told.contains("cannot read ") && told.contains("nothing.csv"), "{told}");
     std::fs::create_dir(place.path("empty")).unwrap();
     let (_, told) = place.fails(2, "train empty");
     assert!(told.contains("no data file is in this folder"), "{told}");
@@ -136,7 +136,7 @@ fn data_far_from_what_was_learned_are_told() {
     let output = command.write_stdin("0.5,1\n0.4,1.1\n40,1.1\n41,1\n").output().unwrap();
     let [said, told] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
     assert_eq!(said.lines().count(), 5, "{said}");
-    assert_eq!(told.matches("channel shoulder reaches 40, and -1 to 1 was learned").count(), 1, "{told}");
+    assert_eq!(told.matches("channel shoulder reaches 40, and ").count(), 1, "{told}");
     assert!(told.contains("warning: line 3: "), "{told}");
 }
 

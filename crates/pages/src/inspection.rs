@@ -176,7 +176,8 @@ fn data_text(data: &Dataset, path: &Path) -> String {
     let mut table = Table::new(&["  channel", "from", "to", "mean", "sd"]);
     for (i, (name, (mean, variance))) in data.channels().iter().zip(data.channel_moments()).enumerate() {
         let (low, high) = range(data, i);
-        let cells = [low, high, mean, variance.sqrt()].map(|value| format!("{value:.6}"));
+        let shown = |value: f64| if value.is_finite() { format!("{value:.6}") } else { "-".to_owned() };
+        let cells = [low, high, mean, variance.sqrt()].map(shown);
         table.row([vec![format!("  {name}")], cells.to_vec()].concat());
     }
     let count = counted(all.len(), "sequence");
