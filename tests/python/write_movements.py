@@ -96,7 +96,7 @@ def robomimic(path, lengths):
             values = angles(np.arange(n) / 40, e)
             demo = data.create_group(f"demo_{e}")
             demo.attrs["num_samples"] = n
-            demo.create_dataset("actions", data=np.diff(values, axis=0, append=values[-1:]) * 10)
+            demo.create_dataset("actions", data=np.vstack([values[1:], values[-1:]]))
             demo.create_dataset("dones", data=np.zeros(n, np.int64))
             obs = demo.create_group("obs")
             obs.create_dataset("robot0_joint_pos", data=values)

@@ -74,7 +74,11 @@ pub fn choose(data: &Dataset) -> Recipe {
     let units = units(channels, sequences, samples);
     because(
         "network.groups.units",
-        format!("For {sequences} sequences on {channels} channels, and no more than {samples} samples can teach."),
+        format!(
+            "For {} on {}, and no more than {samples} samples can teach.",
+            counted(sequences, "sequence"),
+            counted(channels, "channel")
+        ),
     );
     let (period, time_constant) = pace(data);
     because(
@@ -147,6 +151,10 @@ fn period(data: &Dataset, channel: usize) -> Option<f64> {
     let share = (squares / steps.max(1) as f64) / (2.0 * spread / count.max(1) as f64);
     let angle = (1.0 - share).clamp(-1.0, 1.0).acos();
     Some(std::f64::consts::TAU / angle).filter(|period| period.is_finite() && *period < 1e6)
+}
+
+fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
 /// To two digits.
