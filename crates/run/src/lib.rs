@@ -5,6 +5,7 @@
 //! | [`experiment`] | the experiment file: its types, how it is read, checked, overridden and compared |
 //! | [`request`], [`recipe`] | what `train` is given: an experiment file, a run folder, or data alone, for which settings are chosen |
 //! | [`source`] | the sequences of an experiment, made or read, and their fingerprint |
+//! | [`character`] | what kind of movement data are: smooth or noisy, and whether it comes to rest |
 //! | [`training`] | one training, from a resolved experiment to a run folder: begun, gone on with, or begun anew |
 //! | [`verdict`] | the result of a training, in words and as JSON |
 //! | [`run_folder`], [`history`], [`notes`] | what a training leaves behind |
@@ -21,6 +22,7 @@
 pub mod assessment;
 pub mod channel_scores;
 pub mod channels;
+pub mod character;
 pub mod conversion;
 pub mod experiment;
 pub mod failure;

@@ -1,6 +1,6 @@
 //! Where an experiment's sequences come from: a task, which knows the truth, or files.
 
-use scrnn::dataset::Dataset;
+use scrnn::dataset::{Dataset, Sequence};
 use scrnn_sim::tutor::{self, Demonstration, Tutoring};
 use sha2::{Digest, Sha256};
 
@@ -65,10 +65,29 @@ pub fn load(data: &Data, threads: usize) -> Result<Source> {
     if files.is_empty() {
         return Err(Failure::input("the experiment names no file", "add one to `data.files`"));
     }
+    let rest = data.rest;
     let Reading { data, period, mut remarks, .. } = read_all(files, &data.selection())?;
     let suspicions = suspicions::look(&data).into_iter();
+    let data = match rest {
+        Some(rest) if rest > 0.0 => held(&data, rest)?,
+        _ => data,
+    };
     remarks.extend(suspicions.map(|suspicion| Remark::Suspicion { suspicion }));
     Ok(Source { period, remarks, ..Source::of(data) })
+}
+
+/// Holds the last sample of each sequence for a share of its length.
+fn held(data: &Dataset, share: f64) -> Result<Dataset> {
+    let n = data.channels().len();
+    let longer = |sequence: &Sequence| {
+        let count = (share * sequence.len() as f64).round() as usize;
+        let mut values = sequence.values().to_vec();
+        let last = values[values.len().saturating_sub(n)..].to_vec();
+        values.extend(last.iter().copied().cycle().take(count * n));
+        Sequence::new(sequence.name.clone(), n, values)
+    };
+    let sequences = data.sequences().iter().map(longer).collect::<scrnn::error::Result<_>>()?;
+    Ok(Dataset::new(data.channels().to_vec(), sequences)?)
 }
 
 /// How the robot is taught: so many demonstrations of so many samples.
@@ -100,7 +119,14 @@ pub fn digest(data: &Dataset) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use scrnn::dataset::Sequence;
+
+    #[test]
+    fn the_last_sample_is_held() {
+        let sequence = Sequence::new("a", 2, vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]).unwrap();
+        let data = Dataset::new(Dataset::numbered_channels(2), vec![sequence]).unwrap();
+        assert_eq!(held(&data, 0.5).unwrap().sequences()[0].values()[8..], [7.0, 8.0, 7.0, 8.0]);
+        assert_eq!(held(&data, 0.1).unwrap(), data);
+    }
 
     #[test]
     fn the_digest_sees_each_bit_the_split_and_the_names() {

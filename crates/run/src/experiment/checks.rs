@@ -120,6 +120,9 @@ fn check_data(data: &Data) -> Check {
     {
         return complaint(&["data", "axes"], message, "one letter for each axis, as \"nct\" or \"tc\"");
     }
+    if let Some(rest) = data.rest {
+        must((0.0..=10.0).contains(&rest), &["data", "rest"], rest, "a share of a sequence's length, from 0 to 10")?;
+    }
     if let Some(period) = data.period {
         positive(&["data", "period"], period)?;
     }

@@ -100,6 +100,10 @@ pub struct Data {
     /// Seconds between samples, to which the messages of .mcap files are brought. Default: as they are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub period: Option<f64>,
+    /// For movements that come to rest: the last sample of each sequence is held for so long, as a share of its length, so that the
+    /// network learns to stay there. Default 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rest: Option<f64>,
     /// Names of the channels to learn, in this order. Default: all that the files have.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub channels: Option<Vec<String>>,
