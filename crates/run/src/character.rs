@@ -99,9 +99,11 @@ mod tests {
         Dataset::new(vec!["y".into()], (0..4).map(sequence).collect()).unwrap()
     }
 
-    /// Something like noise.
+    /// White noise, between -1/2 and 1/2.
     fn noise(s: usize, k: usize) -> f64 {
-        (12.9898 * k as f64 + 78.233 * s as f64).sin() * 43_758.547 % 1.0
+        let mut bits = (k as u64 + 1000 * s as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        (bits >> 40) as f64 / (1_u64 << 24) as f64 - 0.5
     }
 
     #[test]
@@ -114,7 +116,7 @@ mod tests {
         assert!(smooth.is_smooth() && !smooth.rests);
         let noisy = Character::of(&data(200, noise));
         assert!((noisy.step - 2_f64.sqrt()).abs() < 0.15 && (noisy.turn - 3_f64.sqrt()).abs() < 0.15, "{noisy:?}");
-        let some = Character::of(&data(200, |s, k| wave(s, k) + 0.2 * noise(s, k)));
+        let some = Character::of(&data(200, |s, k| wave(s, k) + 0.5 * noise(s, k)));
         assert!(!some.is_smooth() && some.step < 0.5, "{some:?}");
     }
 

@@ -1,10 +1,11 @@
 //! Settings for data that come without an experiment, each with its reason.
 
 use scrnn::dataset::{Dataset, Sequence};
-use scrnn::learning::Adam;
+use scrnn::learning::{Adam, ClosedLoop};
 use scrnn_data::suspicions::{Suspicion, look};
 
-use crate::experiment::{Comment, Experiment, Group, Network, ScalingName, Training};
+use crate::character::Character;
+use crate::experiment::{Comment, Experiment, Group, MeanUnits, Network, ScalingName, SkipName, Training};
 use crate::training::still_channels;
 
 /// What to begin with.
@@ -13,6 +14,8 @@ use crate::training::still_channels;
 pub struct Recipe {
     /// How samples are scaled.
     pub scaling: ScalingName,
+    /// How long the last sample is held, as a share of its sequence; none for not at all.
+    pub rest: Option<f64>,
     /// The network.
     pub network: Network,
     /// How it learns.
@@ -23,14 +26,16 @@ pub struct Recipe {
 
 /// Steps that a network of this recipe predicts ahead.
 const DELAY: usize = 1;
-/// Multiplications of one step of a network with `units` context units and `channels` channels, there and back.
-const WORK: f64 = 6.0;
 /// Multiplications of a training: about a minute of one core.
-const BUDGET: f64 = 2e11;
-/// Fewest and most epochs.
-const EPOCHS: (f64, f64) = (300.0, 5_000.0);
+const BUDGET: f64 = 6e11;
+/// Multiplications for each weight and step: forward, back, and the gradient.
+const WORK: f64 = 3.0;
 /// Sequences from which on they are learned in batches, and how many there are in a batch.
 const BATCHES: (usize, usize) = (20, 8);
+/// Updates after which little more is gained.
+const UPDATES: (f64, f64) = (300.0, 12_000.0);
+/// How long a movement that comes to rest is held there.
+const REST: f64 = 0.25;
 
 /// An experiment of defaults alone, to be filled in.
 pub(crate) fn bare() -> Experiment {
@@ -38,41 +43,125 @@ pub(crate) fn bare() -> Experiment {
     toml::from_str(text).expect("all that has no default is there")
 }
 
-/// Chooses settings by the size of the data and by how fast they change.
+/// Reasons, each for a key.
+#[derive(Default)]
+struct Reasons(Vec<Comment>);
+
+impl Reasons {
+    fn add(&mut self, key: &str, why: impl Into<String>) {
+        self.0.push(Comment { key: key.to_owned(), text: why.into() });
+    }
+}
+
+/// Chooses settings by what kind of movement the data are, by how fast they change, and by how much there is of them.
 #[must_use]
 pub fn choose(data: &Dataset) -> Recipe {
-    let (channels, sequences) = (data.channels().len(), data.sequences().len());
-    let samples = data.total_samples();
-    let mut reasons = Vec::new();
-    let mut because = |key: &str, why: String| reasons.push(Comment { key: key.to_owned(), text: why });
-
+    let mut reasons = Reasons::default();
     let spikes = look(data).iter().any(|one| matches!(one, Suspicion::Spikes { .. }));
     let scaling = if spikes { ScalingName::Robust } else { ScalingName::Fit };
-    because(
-        "data.scaling",
-        match spikes {
-            true => "There are spikes: they are left out when the range of a channel is measured.".to_owned(),
-            false => "Each channel fills the range that the network can predict.".to_owned(),
-        },
-    );
+    reasons.add("data.scaling", match spikes {
+        true => "There are spikes: they are left out when the range of a channel is measured.",
+        false => "Each channel fills the range that the network can predict.",
+    });
+    reasons.add("network.delay", "The next sample is predicted from this one.");
+    let character = Character::of(data);
+    let (rest, network, training) = match character.is_smooth() {
+        true => smooth(data, character, &mut reasons),
+        false => noisy(data, character, &mut reasons),
+    };
+    Recipe { scaling, rest, network, training, reasons: reasons.0 }
+}
 
-    because("network.delay", "The next sample is predicted from this one.".to_owned());
-    let still = still_channels(data, DELAY);
-    let variance_floor = if still.is_empty() { 1e-5 } else { 1e-4 };
-    because(
-        "network.variance_floor",
-        match still.as_slice() {
-            [] => "No variance is predicted below this (scaled units): smooth data have none to speak of.".to_owned(),
-            still => format!("{} never changes: without a floor its likelihood has no bound.", still.join(", ")),
-        },
+/// Smooth movements: what a straight line does not predict, in a closed loop as well as one step ahead.
+fn smooth(data: &Dataset, character: Character, reasons: &mut Reasons) -> (Option<f64>, Network, Training) {
+    let Experiment { mut network, mut training, .. } = bare();
+    let rest = character.rests.then_some(REST);
+    if rest.is_some() {
+        reasons.add("data.rest", "The movements come to rest: the network learns to stay where they end.");
+    }
+    network.delay = DELAY;
+    network.mean = MeanUnits::Linear;
+    network.skip = SkipName::Extrapolation;
+    network.velocity_inputs = true;
+    network.initial_state_variance = 0.0;
+    network.variance_floor = if character.rests { 1e-3 } else { 1e-4 };
+    let turn = 100.0 * character.turn;
+    reasons.add(
+        "network.skip",
+        format!(
+            "The data are smooth: from step to step a change keeps all but {turn:.0} % of itself. So the network predicts what the last \
+             sample and a share of its last change leave over."
+        ),
     );
-    because(
+    reasons.add("network.velocity_inputs", "With that, the change of a sample says more than its place.");
+    reasons.add("network.mean", "What is left over has no bounds.");
+    reasons.add("network.variance_floor", "In units of what is left over: a place where nothing moves has no likelihood without it.");
+    reasons.add(
         "network.initial_state_variance",
-        "Each sequence finds an initial state of its own, by which it is told from the others.".to_owned(),
+        "All sequences share one initial state, and new ones need no search for theirs. Where sequences begin alike and part later, \
+         try 1: each has a state of its own then.",
     );
+    let (_, time_constant) = pace(data);
+    let units = units(data, 1.5);
+    network.groups = vec![Group::full("context", units, time_constant)];
+    size_reasons(data, time_constant, reasons);
 
-    let units = units(channels, sequences, samples);
-    because(
+    let closed_loop = ClosedLoop::default();
+    // Taught throughout, or up to somewhere and then in copies.
+    let passes = closed_loop.taught + (1.0 - closed_loop.taught) * (1.0 + closed_loop.copies as f64);
+    let samples = data.total_samples() as f64 * (1.0 + rest.unwrap_or(0.0));
+    let batch = batch(data, reasons);
+    training.epochs = epochs(samples * passes, units, 2 * data.channels().len(), updates(data, batch));
+    reasons.add("training.epochs", "About a minute of computing at most.");
+    reasons.add("training.optimiser", "Learns sooner than the thesis' rule.");
+    reasons.add(
+        "training.closed_loop.copies",
+        "Half of the sequences are learned in the closed loop, so that the network can go on from its own predictions, and knows how \
+         far they can be trusted.",
+    );
+    training.closed_loop = Some(closed_loop);
+    training.adam = Some(Adam::with(|it| it.batch_size = batch));
+    (rest, network, training)
+}
+
+/// Noisy movements: the network of the thesis.
+fn noisy(data: &Dataset, character: Character, reasons: &mut Reasons) -> (Option<f64>, Network, Training) {
+    let Experiment { mut network, mut training, .. } = bare();
+    network.delay = DELAY;
+    let still = still_channels(data, DELAY);
+    network.variance_floor = if still.is_empty() { 1e-5 } else { 1e-4 };
+    reasons.add("network.variance_floor", match still.as_slice() {
+        [] => format!(
+            "The data are noisy: a change turns by {:.1} times its size in the next step. No variance is predicted below this (scaled \
+             units).",
+            character.turn
+        ),
+        still => format!("{} never changes: without a floor its likelihood has no bound.", still.join(", ")),
+    });
+    reasons.add(
+        "network.initial_state_variance",
+        "Each sequence finds an initial state of its own, by which it is told from the others.",
+    );
+    let (_, time_constant) = pace(data);
+    let units = units(data, 1.0);
+    network.groups = vec![Group::full("context", units, time_constant)];
+    size_reasons(data, time_constant, reasons);
+    let batch = batch(data, reasons);
+    training.epochs = epochs(data.total_samples() as f64, units, data.channels().len(), updates(data, batch));
+    reasons.add("training.epochs", "About a minute of computing at most.");
+    reasons.add("training.optimiser", "Learns sooner than the thesis' rule.");
+    reasons.add("training.adam.weight_decay", "Keeps the network from learning single samples by heart.");
+    training.adam = Some(Adam::with(|it| {
+        it.rate = if units <= 20 { 1e-2 } else { 5e-3 };
+        it.weight_decay = 0.01;
+        it.batch_size = batch;
+    }));
+    (None, network, training)
+}
+
+fn size_reasons(data: &Dataset, time_constant: f64, reasons: &mut Reasons) {
+    let (channels, sequences, samples) = (data.channels().len(), data.sequences().len(), data.total_samples());
+    reasons.add(
         "network.groups.units",
         format!(
             "For {} on {}, and no more than {samples} samples can teach.",
@@ -80,40 +169,37 @@ pub fn choose(data: &Dataset) -> Recipe {
             counted(channels, "channel")
         ),
     );
-    let (period, time_constant) = pace(data);
-    because(
-        "network.groups.time_constant",
-        match period {
-            Some(period) => format!("In steps. The data swing about once in {period:.0} steps."),
-            None => "In steps.".to_owned(),
-        },
-    );
-
-    let work = samples as f64 * ((units * units + 3 * units * channels) as f64) * WORK;
-    let epochs = rounded((BUDGET / work).clamp(EPOCHS.0, EPOCHS.1));
-    because("training.epochs", "About a minute of computing, or as many as a small set needs.".to_owned());
-    because("training.optimiser", "Learns sooner than the thesis' rule.".to_owned());
-    let adam = Adam::with(|it| {
-        it.rate = if units <= 20 { 1e-2 } else { 5e-3 };
-        it.weight_decay = 0.01;
-        it.batch_size = if sequences > BATCHES.0 { BATCHES.1 } else { 0 };
+    reasons.add("network.groups.time_constant", match pace(data).0 {
+        Some(period) => format!("In steps. The data swing about once in {period:.0} steps."),
+        None => format!("In steps. {time_constant} suits data that do not swing."),
     });
-    because("training.adam.weight_decay", "Keeps the network from learning single samples by heart.".to_owned());
-    if adam.batch_size > 0 {
-        because("training.adam.batch_size", "Of many sequences, small batches learn sooner.".to_owned());
-    }
+}
 
-    let Experiment { mut network, mut training, .. } = bare();
-    network.delay = DELAY;
-    network.variance_floor = variance_floor;
-    network.groups = vec![Group::full("context", units, time_constant)];
-    (training.epochs, training.adam) = (epochs, Some(adam));
-    Recipe { scaling, network, training, reasons }
+/// Sequences of a batch; 0 takes all.
+fn batch(data: &Dataset, reasons: &mut Reasons) -> usize {
+    if data.sequences().len() < BATCHES.0 {
+        return 0;
+    }
+    reasons.add("training.adam.batch_size", "Of many sequences, small batches learn sooner.");
+    BATCHES.1
+}
+
+/// Updates of an epoch.
+fn updates(data: &Dataset, batch: usize) -> usize {
+    if batch == 0 { 1 } else { data.sequences().len().div_ceil(batch) }
+}
+
+/// Epochs that the budget allows, of so many steps each, and no more updates than do any good.
+fn epochs(steps: f64, units: usize, inputs: usize, updates: usize) -> u64 {
+    let work = steps * ((units * units + 3 * units * inputs) as f64) * WORK;
+    let few = |count: f64| (count / updates as f64).max(1.0);
+    rounded((BUDGET / work).clamp(few(UPDATES.0), few(UPDATES.1)))
 }
 
 /// Context units: more for more to tell apart, fewer where there is little to learn from.
-fn units(channels: usize, sequences: usize, samples: usize) -> usize {
-    let wanted = 10.0 + 5.0 * ((channels * sequences) as f64).sqrt();
+fn units(data: &Dataset, factor: f64) -> usize {
+    let (channels, sequences, samples) = (data.channels().len(), data.sequences().len(), data.total_samples());
+    let wanted = factor * (10.0 + 5.0 * ((channels * sequences) as f64).sqrt());
     let taught = (2.0 * (samples * channels) as f64).sqrt();
     (wanted.min(taught).round() as usize).clamp(8, 60)
 }
@@ -136,8 +222,7 @@ fn period(data: &Dataset, channel: usize) -> Option<f64> {
     let n = data.channels().len();
     let (mut squares, mut steps, mut spread, mut count) = (0.0, 0_usize, 0.0, 0_usize);
     for sequence in data.sequences() {
-        let values =
-            |sequence: &Sequence| sequence.values().iter().skip(channel).step_by(n).copied().collect::<Vec<_>>();
+        let values = |sequence: &Sequence| sequence.values().iter().skip(channel).step_by(n).copied().collect::<Vec<_>>();
         let values = values(sequence);
         let there = || values.iter().copied().filter(|value| value.is_finite());
         let mean = there().sum::<f64>() / there().count().max(1) as f64;
@@ -191,7 +276,7 @@ mod tests {
         let small = choose(&waves(24.0, 1, 60));
         let large = choose(&waves(24.0, 30, 2000));
         let of = |recipe: &Recipe| (recipe.network.groups[0].units, recipe.training.epochs);
-        assert_eq!(of(&small), (11, 5000));
+        assert_eq!(of(&small), (16, 12_000));
         assert!(of(&large).0 > 30 && of(&large).1 < 2000, "{:?}", of(&large));
         let batch = |recipe: &Recipe| recipe.training.adam.as_ref().unwrap().batch_size;
         assert_eq!((batch(&small), batch(&large)), (0, 8));

@@ -81,6 +81,9 @@ impl Request {
     pub fn experiment(&self, overrides: &[Override], out: Option<&Path>, resume: bool) -> Result<Asked> {
         match self {
             Self::Experiment(file) => {
+                if let Some(begun) = asks_for_recipe(file) {
+                    return by_recipe((file, begun), overrides, out);
+                }
                 let experiment = experiment::read(file, overrides)?;
                 let experiment = experiment.resolved(file.parent().unwrap_or(Path::new("")))?;
                 Ok(Asked::of(experiment, None, out))
@@ -162,11 +165,16 @@ fn alone(files: &[PathBuf], overrides: &[Override], out: Option<&Path>, resume: 
     let files = Data { files: Some(files.to_vec()), ..Data::default() };
     let first = Experiment { name: name.clone(), data: files, ..recipe::bare() };
     let first = experiment::read_text("the experiment", &first.to_file(), &reading)?;
-    let source = source::load(&first.clone().resolved(Path::new(""))?.data, 1)?;
+    let mut source = source::load(&first.clone().resolved(Path::new(""))?.data, 1)?;
 
-    let Recipe { scaling, network, training, reasons } = recipe::choose(&source.data);
+    let Recipe { scaling, rest, network, training, reasons } = recipe::choose(&source.data);
     let scaling = first.data.scaling.clone().unwrap_or(ScalingChoice::Named(scaling));
-    let data = Data { scaling: Some(scaling), ..first.data };
+    if first.data.rest.is_none()
+        && let Some(rest) = rest
+    {
+        source.data = source::held(&source.data, rest)?;
+    }
+    let data = Data { scaling: Some(scaling), rest: first.data.rest.or(rest), ..first.data };
     let chosen = Experiment { name, data, network, training, ..recipe::bare() };
     let mut experiment =
         experiment::read_text("the experiment", &chosen.to_file(), overrides)?.resolved(Path::new(""))?;
@@ -187,6 +195,70 @@ fn plain(path: &[String]) -> String {
             format!("network.groups.{}", rest.join("."))
         }
         path => path.join("."),
+    }
+}
+
+/// The table of an experiment file that leaves settings to a recipe. What cannot be read is left to whoever says why.
+fn asks_for_recipe(file: &Path) -> Option<toml::Table> {
+    let table: toml::Table = toml::from_str(&std::fs::read_to_string(file).ok()?).ok()?;
+    let recipe = table.get("training")?.get("recipe")?.as_str()?;
+    (recipe == "auto").then_some(table)
+}
+
+/// The experiment of a file that leaves settings to the recipe: those that the file has, and the chosen ones for all else.
+fn by_recipe((file, given): (&Path, toml::Table), overrides: &[Override], out: Option<&Path>) -> Result<Asked> {
+    let name = file.display().to_string();
+    let folder = file.parent().unwrap_or(Path::new(""));
+    // The data first, with all else as it may be: what is wrong with them is said in their place.
+    let mut first = toml::Table::try_from(recipe::bare()).expect("an experiment is a table");
+    for key in ["name", "seed", "data"] {
+        if let Some(value) = given.get(key) {
+            first.insert(key.to_owned(), value.clone());
+        }
+    }
+    let of_data = |change: &&Override| change.path.first().is_some_and(|part| part == "data");
+    let reading: Vec<Override> = overrides.iter().filter(of_data).cloned().collect();
+    let text = |table: &toml::Table| toml::to_string(table).expect("a table that was read can be written");
+    let first = experiment::read_text(&name, &text(&first), &reading)?;
+    if first.data.task.is_some() {
+        let message = "`training.recipe` chooses settings for data from files, and these are a task of the thesis";
+        return Err(Failure::input(message, "leave recipe out: assets/experiments has settings for the tasks"));
+    }
+    let mut source = source::load(&first.clone().resolved(folder)?.data, 1)?;
+    let Recipe { scaling, rest, network, training, reasons } = recipe::choose(&source.data);
+    let data = Data {
+        scaling: first.data.scaling.clone().or(Some(ScalingChoice::Named(scaling))),
+        rest: first.data.rest.or(rest),
+        ..first.data.clone()
+    };
+    if let (None, Some(rest)) = (first.data.rest, rest) {
+        source.data = source::held(&source.data, rest)?;
+    }
+    let chosen = Experiment { data, network, training, ..first };
+    let mut whole = toml::Table::try_from(&chosen).expect("an experiment is a table");
+    let mut own = given;
+    if let Some(training) = own.get_mut("training").and_then(toml::Value::as_table_mut) {
+        training.remove("recipe");
+    }
+    let has = |key: &str| {
+        let (first, rest) = key.split_once('.').unwrap_or((key, ""));
+        let value = own.get(first).and_then(|table| rest.split('.').try_fold(table, |table, part| table.get(part)));
+        value.is_some()
+    };
+    let reasons: Vec<Comment> = reasons.into_iter().filter(|reason| !has(&reason.key)).collect();
+    lay_over(&mut whole, own);
+    let mut experiment = experiment::read_text(&name, &text(&whole), overrides)?.resolved(folder)?;
+    experiment.comments = reasons;
+    Ok(Asked::of(experiment, Some(source), out))
+}
+
+/// Puts `upper` over `lower`, table by table; all else, lists of groups among it, is replaced.
+fn lay_over(lower: &mut toml::Table, upper: toml::Table) {
+    for (key, value) in upper {
+        match (lower.get_mut(&key), value) {
+            (Some(toml::Value::Table(lower)), toml::Value::Table(upper)) => lay_over(lower, upper),
+            (_, value) => _ = lower.insert(key, value),
+        }
     }
 }
 
@@ -217,6 +289,7 @@ fn name_for(files: &[PathBuf]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::experiment::SkipName;
 
     fn paths(paths: &[&str]) -> Vec<PathBuf> {
         paths.iter().map(PathBuf::from).collect()
@@ -252,6 +325,30 @@ mod tests {
         std::fs::write(at("run").join(EXPERIMENT), "").unwrap();
         assert!(of("run").is_err());
         assert_eq!(Request::of(&[at("run")], true).unwrap(), Request::Run(at("run")));
+    }
+
+    #[test]
+    fn a_recipe_fills_in_what_an_experiment_leaves_out() {
+        let folder = tempfile::tempdir().unwrap();
+        let rows: String = (0..300).map(|k| format!("{}\n", (f64::from(k) * 0.1).sin())).collect();
+        std::fs::write(folder.path().join("mine.csv"), format!("a\n{rows}")).unwrap();
+        let asked = |text: &str| {
+            let file = folder.path().join("mine.toml");
+            std::fs::write(&file, text).unwrap();
+            Request::of(&[file], false).unwrap().experiment(&[], None, false)
+        };
+        let data = "name = \"mine\"\n[data]\nfiles = [\"mine.csv\"]\n";
+        let chosen = asked(&format!("{data}[training]\nrecipe = \"auto\"\n")).unwrap().experiment;
+        assert_eq!(chosen.network.skip, SkipName::Extrapolation);
+        assert!(chosen.training.closed_loop.is_some() && chosen.training.recipe.is_none());
+        assert!(chosen.comments.iter().any(|comment| comment.key == "network.skip"));
+        let own = format!("{data}[network]\nskip = \"residual\"\n[training]\nrecipe = \"auto\"\nepochs = 7\n");
+        let own = asked(&own).unwrap().experiment;
+        assert_eq!((own.network.skip, own.training.epochs), (SkipName::Residual, 7));
+        assert_eq!(own.network.groups, chosen.network.groups);
+        assert!(!own.comments.iter().any(|comment| comment.key == "network.skip"));
+        let task = asked("name = \"s\"\n[data]\ntask = \"sinusoid\"\n[training]\nrecipe = \"auto\"\n");
+        assert!(task.unwrap_err().to_string().contains("a task of the thesis"));
     }
 
     #[test]

@@ -77,7 +77,10 @@ pub fn load(data: &Data, threads: usize) -> Result<Source> {
 }
 
 /// Holds the last sample of each sequence for a share of its length.
-fn held(data: &Dataset, share: f64) -> Result<Dataset> {
+///
+/// # Errors
+/// None: the sequences are as sound as they were.
+pub fn held(data: &Dataset, share: f64) -> Result<Dataset> {
     let n = data.channels().len();
     let longer = |sequence: &Sequence| {
         let count = (share * sequence.len() as f64).round() as usize;

@@ -274,6 +274,10 @@ fn unit() -> f64 {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Training {
+    /// "auto" chooses whatever the file does not say of `[network]` and `[training]`, by the data, as where there is no experiment file;
+    /// then neither `epochs` nor `optimiser` nor groups need be given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recipe: Option<RecipeName>,
     /// How often all sequences are seen. Each time is one update, but for Adam in batches.
     pub epochs: u64,
     /// The rule of ascent. Only the table of the same name is used.
@@ -297,6 +301,14 @@ pub struct Training {
     /// Lets L-BFGS make the last epochs; an empty table turns it on.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lbfgs: Option<Lbfgs>,
+}
+
+/// A way to choose settings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RecipeName {
+    /// By the data.
+    Auto,
 }
 
 /// The rules of ascent.
