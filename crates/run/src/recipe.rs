@@ -276,7 +276,7 @@ mod tests {
         let small = choose(&waves(24.0, 1, 60));
         let large = choose(&waves(24.0, 30, 2000));
         let of = |recipe: &Recipe| (recipe.network.groups[0].units, recipe.training.epochs);
-        assert_eq!(of(&small), (16, 12_000));
+        assert_eq!(of(&small), (11, 12_000));
         assert!(of(&large).0 > 30 && of(&large).1 < 2000, "{:?}", of(&large));
         let batch = |recipe: &Recipe| recipe.training.adam.as_ref().unwrap().batch_size;
         assert_eq!((batch(&small), batch(&large)), (0, 8));
