@@ -71,7 +71,8 @@ fn comes_to_rest(sequence: &Sequence, deviations: &[f64]) -> bool {
     let speed = |from: usize| {
         let length = |k: usize| {
             let parts = sequence.sample(k).iter().zip(sequence.sample(k - 1)).zip(deviations);
-            let squares = parts.filter(|(_, deviation)| **deviation > 0.0).map(|((x, before), sd)| ((x - before) / sd).powi(2));
+            let squares =
+                parts.filter(|(_, deviation)| **deviation > 0.0).map(|((x, before), sd)| ((x - before) / sd).powi(2));
             squares.filter(|square| square.is_finite()).sum::<f64>().sqrt()
         };
         let count = sequence.len() - from;

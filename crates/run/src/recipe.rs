@@ -59,10 +59,13 @@ pub fn choose(data: &Dataset) -> Recipe {
     let mut reasons = Reasons::default();
     let spikes = look(data).iter().any(|one| matches!(one, Suspicion::Spikes { .. }));
     let scaling = if spikes { ScalingName::Robust } else { ScalingName::Fit };
-    reasons.add("data.scaling", match spikes {
-        true => "There are spikes: they are left out when the range of a channel is measured.",
-        false => "Each channel fills the range that the network can predict.",
-    });
+    reasons.add(
+        "data.scaling",
+        match spikes {
+            true => "There are spikes: they are left out when the range of a channel is measured.",
+            false => "Each channel fills the range that the network can predict.",
+        },
+    );
     reasons.add("network.delay", "The next sample is predicted from this one.");
     let character = Character::of(data);
     let (rest, network, training) = match character.is_smooth() {
@@ -95,7 +98,10 @@ fn smooth(data: &Dataset, character: Character, reasons: &mut Reasons) -> (Optio
     );
     reasons.add("network.velocity_inputs", "With that, the change of a sample says more than its place.");
     reasons.add("network.mean", "What is left over has no bounds.");
-    reasons.add("network.variance_floor", "In units of what is left over: a place where nothing moves has no likelihood without it.");
+    reasons.add(
+        "network.variance_floor",
+        "In units of what is left over: a place where nothing moves has no likelihood without it.",
+    );
     reasons.add(
         "network.initial_state_variance",
         "All sequences share one initial state, and new ones need no search for theirs. Where sequences begin alike and part later, \
@@ -169,10 +175,13 @@ fn size_reasons(data: &Dataset, time_constant: f64, reasons: &mut Reasons) {
             counted(channels, "channel")
         ),
     );
-    reasons.add("network.groups.time_constant", match pace(data).0 {
-        Some(period) => format!("In steps. The data swing about once in {period:.0} steps."),
-        None => format!("In steps. {time_constant} suits data that do not swing."),
-    });
+    reasons.add(
+        "network.groups.time_constant",
+        match pace(data).0 {
+            Some(period) => format!("In steps. The data swing about once in {period:.0} steps."),
+            None => format!("In steps. {time_constant} suits data that do not swing."),
+        },
+    );
 }
 
 /// Sequences of a batch; 0 takes all.
@@ -222,7 +231,8 @@ fn period(data: &Dataset, channel: usize) -> Option<f64> {
     let n = data.channels().len();
     let (mut squares, mut steps, mut spread, mut count) = (0.0, 0_usize, 0.0, 0_usize);
     for sequence in data.sequences() {
-        let values = |sequence: &Sequence| sequence.values().iter().skip(channel).step_by(n).copied().collect::<Vec<_>>();
+        let values =
+            |sequence: &Sequence| sequence.values().iter().skip(channel).step_by(n).copied().collect::<Vec<_>>();
         let values = values(sequence);
         let there = || values.iter().copied().filter(|value| value.is_finite());
         let mean = there().sum::<f64>() / there().count().max(1) as f64;
