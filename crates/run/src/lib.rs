@@ -13,6 +13,7 @@
 //! | [`assessment`], [`truth`], [`channel_scores`] | how well it predicts, beside simple models and what is known of the noise |
 //! | [`familiar`] | new data beside the range of what was learned |
 //! | [`conversion`] | data from one kind of file to another |
+//! | [`likeness`] | which learned sequence a new one is like, where all share one initial state |
 //! | [`messages`], [`interrupt`] | how news and progress leave, and how a person's wish to stop comes in |
 //! | [`memory`] | what would not fit is refused before it is tried |
 //! | [`failure`] | what ends a request early, and with which exit code |
@@ -29,6 +30,7 @@ pub mod failure;
 pub mod familiar;
 pub mod history;
 pub mod interrupt;
+pub mod likeness;
 pub mod memory;
 pub mod messages;
 pub mod notes;

@@ -84,7 +84,7 @@ fn smooth(data: &Dataset, character: Character, reasons: &mut Reasons) -> (Optio
     }
     network.delay = DELAY;
     network.mean = MeanUnits::Linear;
-    network.skip = SkipName::Extrapolation;
+    network.skip = SkipName::Autoregressive;
     network.velocity_inputs = true;
     network.initial_state_variance = 0.0;
     network.variance_floor = if character.rests { 1e-3 } else { 1e-4 };
@@ -92,8 +92,8 @@ fn smooth(data: &Dataset, character: Character, reasons: &mut Reasons) -> (Optio
     reasons.add(
         "network.skip",
         format!(
-            "The data are smooth: from step to step a change keeps all but {turn:.0} % of itself. So the network predicts what the last \
-             sample and a share of its last change leave over."
+            "The data are smooth: from step to step a change keeps all but {turn:.0} % of itself. So the network predicts what a linear \
+             map of the last samples leaves over."
         ),
     );
     reasons.add("network.velocity_inputs", "With that, the change of a sample says more than its place.");
@@ -112,7 +112,7 @@ fn smooth(data: &Dataset, character: Character, reasons: &mut Reasons) -> (Optio
     network.groups = vec![Group::full("context", units, time_constant)];
     size_reasons(data, time_constant, reasons);
 
-    let closed_loop = ClosedLoop::default();
+    let closed_loop = ClosedLoop::with(|it| (it.weight, it.taught) = (1.0, 0.0));
     // Taught throughout, or up to somewhere and then in copies.
     let passes = closed_loop.taught + (1.0 - closed_loop.taught) * (1.0 + closed_loop.copies as f64);
     let samples = data.total_samples() as f64 * (1.0 + rest.unwrap_or(0.0));
@@ -122,8 +122,8 @@ fn smooth(data: &Dataset, character: Character, reasons: &mut Reasons) -> (Optio
     reasons.add("training.optimiser", "Learns sooner than the thesis' rule.");
     reasons.add(
         "training.closed_loop.copies",
-        "Half of the sequences are learned in the closed loop, so that the network can go on from its own predictions, and knows how \
-         far they can be trusted.",
+        "All sequences are learned in the closed loop, so that the network can go on from its own predictions, and knows how far \
+         they can be trusted.",
     );
     training.closed_loop = Some(closed_loop);
     training.adam = Some(Adam::with(|it| it.batch_size = batch));

@@ -339,7 +339,7 @@ mod tests {
         };
         let data = "name = \"mine\"\n[data]\nfiles = [\"mine.csv\"]\n";
         let chosen = asked(&format!("{data}[training]\nrecipe = \"auto\"\n")).unwrap().experiment;
-        assert_eq!(chosen.network.skip, SkipName::Extrapolation);
+        assert_eq!(chosen.network.skip, SkipName::Autoregressive);
         assert!(chosen.training.closed_loop.is_some() && chosen.training.recipe.is_none());
         assert!(chosen.comments.iter().any(|comment| comment.key == "network.skip"));
         let own = format!("{data}[network]\nskip = \"residual\"\n[training]\nrecipe = \"auto\"\nepochs = 7\n");

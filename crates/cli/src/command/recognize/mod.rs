@@ -1,6 +1,7 @@
 //! `scrnn recognize`: which initial state makes the network predict a sequence best (thesis 2.9)? With `--online`: which
 //! internal state explains what just happened (thesis 2.10.2)?
 
+mod alike;
 mod deadline;
 mod online;
 mod regression;
@@ -123,13 +124,15 @@ struct Found {
     trials: Vec<Tried>,
 }
 
-/// How likely a learned sequence's initial state makes the data.
+/// How likely a learned sequence's initial state makes the data; where all share one, how far its contexts are off.
 #[derive(Debug, Serialize)]
 struct Learned {
     /// Its number, from 1.
     number: usize,
     sequence: String,
     ln_likelihood: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    distance: Option<f64>,
 }
 
 /// Where one start ended.
@@ -170,9 +173,13 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         recognize(&trained.network(), &checkpoint.initial_states, &scaled, &options(arguments, &trained), &engine)?;
     let heard = arguments.observed.unwrap_or(usize::MAX);
     let generated = replay(&trained, &scaled, &recognitions, heard, &engine)?;
-    let found = (0..recognitions.len())
+    let mut found = (0..recognitions.len())
         .map(|s| summary(&trained, &data.sequences()[s], &recognitions[s], &generated[s], heard))
         .collect::<Vec<_>>();
+    let by_likeness = alike::share_one_state(&trained);
+    if by_likeness {
+        alike::rank(&trained, &data, heard, &mut found, shared)?;
+    }
 
     if let Some(path) = &arguments.out {
         let states = states(&trained, &data, &recognitions)?;
@@ -185,7 +192,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     if arguments.json {
         output::print_json_line(&serde_json::json!({ "sequences": found }))?;
     } else {
-        output::print(&table(&found, arguments.observed.is_some()))?;
+        output::print(&table(&found, arguments.observed.is_some(), by_likeness))?;
     }
     Ok(Ending::Done)
 }
@@ -263,6 +270,7 @@ fn summary(
                 number: ranked.sequence + 1,
                 sequence: checkpoint.sequences[ranked.sequence].clone(),
                 ln_likelihood: per_value(ranked.ln_likelihood),
+                distance: None,
             })
             .collect(),
         trials: recognition
@@ -302,13 +310,16 @@ fn raw_means(trained: &Trained, generated: &Generated) -> Vec<f64> {
     generated.mean.iter().enumerate().map(|(k, &mean)| scaling.to_raw(k % scaling.channels(), mean)).collect()
 }
 
-fn table(found: &[Found], completed: bool) -> String {
+fn table(found: &[Found], completed: bool, by_likeness: bool) -> String {
     let likelihood = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.4}"));
     let mut head = vec!["sequence", "start", "ln L", "error"];
     if completed {
         head.push("error beyond");
     }
-    head.push("most likely learned sequences (ln L)");
+    head.push(match by_likeness {
+        true => "learned sequences most alike (distance of contexts)",
+        false => "most likely learned sequences (ln L)",
+    });
     let mut table = Table::new(&head);
     for Found { sequence, start, ln_likelihood, error, completion_error, learned, .. } in found {
         let mut row = vec![sequence.clone(), start.clone(), likelihood(*ln_likelihood), format!("{error:.3e}")];
@@ -318,7 +329,8 @@ fn table(found: &[Found], completed: bool) -> String {
         let named = learned.iter().take(NAMED).map(|one| {
             let name =
                 if one.sequence == one.number.to_string() { String::new() } else { format!(" {}", one.sequence) };
-            let value = one.ln_likelihood.map_or(String::new(), |value| format!(" ({value:.4})"));
+            let value = one.ln_likelihood.or(one.distance);
+            let value = value.map_or(String::new(), |value| format!(" ({value:.4})"));
             format!("{}{name}{value}", one.number)
         });
         row.push(named.collect::<Vec<_>>().join(", "));

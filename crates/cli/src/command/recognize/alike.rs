@@ -1,0 +1,48 @@
+//! What is said of learned sequences where they share one initial state: by what the network heard, not by where it began.
+
+use scrnn::dataset::Dataset;
+use scrnn_run::failure::Result;
+use scrnn_run::likeness;
+use scrnn_run::trained::Trained;
+
+use super::{Found, Learned};
+use crate::args::Shared;
+
+/// Whether all learned sequences of a run share one initial state.
+pub fn share_one_state(trained: &Trained) -> bool {
+    let variance =
+        trained.notes.as_ref().and_then(|notes| notes.experiment["network"]["initial_state_variance"].as_f64());
+    variance == Some(0.0)
+}
+
+/// Ranks the learned sequences by likeness, in place of the likelihoods of their initial states, which are all the same.
+///
+/// # Errors
+/// What the network cannot run on.
+pub fn rank(trained: &Trained, new: &Dataset, heard: usize, found: &mut [Found], shared: &Shared) -> Result<()> {
+    let engine = shared.engine()?;
+    let learned = match trained.learned_data(engine.threads()) {
+        Ok(learned) => learned,
+        Err(failure) => {
+            shared.say(&format!(
+                "note: which learned sequences these are like is not told: all share one initial state, and what was learned cannot be \
+                 read again ({failure})"
+            ));
+            found.iter_mut().for_each(|one| one.learned.clear());
+            return Ok(());
+        }
+    };
+    for (found, ranking) in found.iter_mut().zip(likeness::rank(trained, &learned, new, heard, &engine)?) {
+        let one = |like: &likeness::Likeness| Learned {
+            number: like.sequence + 1,
+            sequence: trained.checkpoint.sequences[like.sequence].clone(),
+            ln_likelihood: None,
+            distance: Some(like.distance),
+        };
+        found.learned = ranking.iter().take(KEPT).map(one).collect();
+    }
+    Ok(())
+}
+
+/// As many as recognition keeps of its ranking.
+const KEPT: usize = 100;
