@@ -17,7 +17,8 @@ pub struct Character {
     pub step: f64,
     /// The same.
     pub turn: f64,
-    /// Whether movements slow down to rest where their sequences end.
+    /// Whether movements come to rest where their sequences end: they slow down there, or all end in one place that they did not begin
+    /// in.
     pub rests: bool,
 }
 
@@ -26,6 +27,8 @@ const END: f64 = 0.03;
 const SLOW: f64 = 0.1;
 /// The share of the sequences that must come to rest.
 const MOST: f64 = 0.8;
+/// How near ends must be to each other, beside the whole movement, and beside the beginnings.
+const NEAR: (f64, f64) = (0.05, 0.25);
 
 impl Character {
     /// Looks at data. Where no channel moves, step and turn are 0.
@@ -35,7 +38,7 @@ impl Character {
         let moving = (0..deviations.len()).filter(|i| deviations[*i] > 0.0);
         let (mut steps, mut turns): (Vec<f64>, Vec<f64>) = moving.map(|i| of_channel(data, i, deviations[i])).unzip();
         let resting = data.sequences().iter().filter(|sequence| comes_to_rest(sequence, &deviations)).count();
-        let rests = resting as f64 >= MOST * data.sequences().len() as f64;
+        let rests = resting as f64 >= MOST * data.sequences().len() as f64 || have_one_end(data, &deviations);
         Self { step: median(&mut steps), turn: median(&mut turns), rests }
     }
 
@@ -86,6 +89,28 @@ fn comes_to_rest(sequence: &Sequence, deviations: &[f64]) -> bool {
     whole > 0.0 && speed(sequence.len() - last) < SLOW * whole
 }
 
+/// Whether all sequences end in one place, and do not begin in one.
+fn have_one_end(data: &Dataset, deviations: &[f64]) -> bool {
+    let sequences = data.sequences();
+    let spread = |at: &dyn Fn(&Sequence) -> usize| {
+        let of_channel = |(i, deviation): (usize, &f64)| {
+            let values = || sequences.iter().map(|own| own.sample(at(own))[i]).filter(|value| value.is_finite());
+            let count = values().count().max(1) as f64;
+            let mean = values().sum::<f64>() / count;
+            values().map(|value| ((value - mean) / deviation).powi(2)).sum::<f64>() / count
+        };
+        let moving = deviations.iter().enumerate().filter(|(_, deviation)| **deviation > 0.0);
+        let (sum, count) = moving.map(of_channel).fold((0.0, 0_usize), |(sum, count), one| (sum + one, count + 1));
+        (sum / count.max(1) as f64).sqrt()
+    };
+    let long = sequences.len() > 2 && sequences.iter().all(|own| own.len() > 10);
+    if !long {
+        return false;
+    }
+    let (first, last) = (spread(&|_| 0), spread(&|own| own.len() - 1));
+    last < NEAR.0 && last < NEAR.1 * first
+}
+
 fn median(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(0.0)
@@ -126,6 +151,11 @@ mod tests {
         let reach = |_: usize, k: usize| (-(k as f64) / 15.0).exp();
         assert!(Character::of(&data(100, reach)).rests);
         assert!(!Character::of(&data(9, reach)).rests);
+        let line_to_the_origin = |s: usize, k: usize| (99 - k) as f64 * (1.0 + s as f64);
+        assert!(Character::of(&data(100, line_to_the_origin)).rests);
+        // The same wave again and again ends where it ends, and goes on.
+        let again = |_: usize, k: usize| (0.1 * k as f64).sin();
+        assert!(!Character::of(&data(200, again)).rests);
         let wave = |s: usize, k: usize| (0.1 * k as f64 + s as f64).sin();
         let gapped = Character::of(&data(200, |s, k| if k % 11 == 3 { f64::NAN } else { wave(s, k) }));
         let whole = Character::of(&data(200, wave));

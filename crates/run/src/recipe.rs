@@ -26,14 +26,14 @@ pub struct Recipe {
 
 /// Steps that a network of this recipe predicts ahead.
 const DELAY: usize = 1;
-/// Multiplications of a training: about a minute of one core.
-const BUDGET: f64 = 6e11;
+/// Multiplications of a training: a minute or two of one core.
+const BUDGET: f64 = 1e12;
 /// Multiplications for each weight and step: forward, back, and the gradient.
 const WORK: f64 = 3.0;
 /// Sequences from which on they are learned in batches, and how many there are in a batch.
-const BATCHES: (usize, usize) = (20, 8);
+const BATCHES: (usize, usize) = (20, 10);
 /// Updates after which little more is gained.
-const UPDATES: (f64, f64) = (300.0, 12_000.0);
+const UPDATES: (f64, f64) = (300.0, 10_000.0);
 /// How long a movement that comes to rest is held there.
 const REST: f64 = 0.25;
 
@@ -118,7 +118,7 @@ fn smooth(data: &Dataset, character: Character, reasons: &mut Reasons) -> (Optio
     let samples = data.total_samples() as f64 * (1.0 + rest.unwrap_or(0.0));
     let batch = batch(data, reasons);
     training.epochs = epochs(samples * passes, units, 2 * data.channels().len(), updates(data, batch));
-    reasons.add("training.epochs", "About a minute of computing at most.");
+    reasons.add("training.epochs", "A minute or two of one core at most.");
     reasons.add("training.optimiser", "Learns sooner than the thesis' rule.");
     reasons.add(
         "training.closed_loop.copies",
@@ -154,7 +154,7 @@ fn noisy(data: &Dataset, character: Character, reasons: &mut Reasons) -> (Option
     size_reasons(data, time_constant, reasons);
     let batch = batch(data, reasons);
     training.epochs = epochs(data.total_samples() as f64, units, data.channels().len(), updates(data, batch));
-    reasons.add("training.epochs", "About a minute of computing at most.");
+    reasons.add("training.epochs", "A minute or two of one core at most.");
     reasons.add("training.optimiser", "Learns sooner than the thesis' rule.");
     reasons.add("training.adam.weight_decay", "Keeps the network from learning single samples by heart.");
     training.adam = Some(Adam::with(|it| {
@@ -286,10 +286,10 @@ mod tests {
         let small = choose(&waves(24.0, 1, 60));
         let large = choose(&waves(24.0, 30, 2000));
         let of = |recipe: &Recipe| (recipe.network.groups[0].units, recipe.training.epochs);
-        assert_eq!(of(&small), (11, 12_000));
+        assert_eq!(of(&small), (11, 10_000));
         assert!(of(&large).0 > 30 && of(&large).1 < 2000, "{:?}", of(&large));
         let batch = |recipe: &Recipe| recipe.training.adam.as_ref().unwrap().batch_size;
-        assert_eq!((batch(&small), batch(&large)), (0, 8));
+        assert_eq!((batch(&small), batch(&large)), (0, 10));
     }
 
     #[test]
