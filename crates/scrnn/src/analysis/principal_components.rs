@@ -12,6 +12,9 @@ pub struct PrincipalComponents {
     pub coordinates: Vec<f64>,
 }
 
+/// Differences up to this share of a coordinate are rounding.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
+
 impl PrincipalComponents {
     /// Of points with `dimensions` coordinates each, row-major. There are as many components as the smaller of points and
     /// dimensions. A component's sign is free; here the point that lies farthest out on it lies on its positive side.
@@ -25,7 +28,12 @@ impl PrincipalComponents {
         let mut centred = DMatrix::from_row_slice(n, dimensions, points);
         for mut column in centred.column_iter_mut() {
             let mean = column.sum() / n as f64;
+            let rounding = ROUNDING * column.amax();
             column.add_scalar_mut(-mean);
+            // What differs by rounding alone is the same: its directions mean nothing, and no iteration would find them.
+            if column.amax() <= rounding {
+                column.fill(0.0);
+            }
         }
         // centred = U S V', and its rows along the axes V are U S.
         let svd = centred.svd(true, false);
@@ -84,5 +92,9 @@ mod tests {
             assert!(difference.abs() < 1e-12);
         }
         assert_eq!(PrincipalComponents::of(&[1.0, 1.0, 1.0, 1.0], 2).share(1), 0.0);
+        // Points that are all one, up to the last digit.
+        let one: Vec<f64> = (0..60).map(|i| 0.1 * (1.0 + (7.3 * f64::from(i)).sin())).collect();
+        let points: Vec<f64> = (0..25).flat_map(|_| one.clone()).collect();
+        assert_eq!(PrincipalComponents::of(&points, 60).variances, vec![0.0; 25]);
     }
 }
