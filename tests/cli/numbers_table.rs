@@ -1,4 +1,4 @@
-//! Every numeric option, with a command on tiny inputs that uses it.
+//! Every numeric option, with a command on tiny inputs that uses it: the runs `run`, `reach` and `interact`, and `new.csv`.
 
 /// Command, option, and a line that needs only this option's value to be whole.
 pub const OPTIONS: &[(&str, &str, &str)] = &[
@@ -27,17 +27,17 @@ pub const OPTIONS: &[(&str, &str, &str)] = &[
     ("recognize", "momentum", "recognize run new.csv --online"),
     ("recognize", "max-norm", "recognize run new.csv --online"),
     ("recognize", "deadline", "recognize run new.csv --online"),
-    ("simulate reach", "shift-at", "simulate reach run --to left"),
-    ("simulate reach", "cycles", "simulate reach run"),
-    ("simulate reach", "seed", "simulate reach run"),
-    ("simulate interact", "trials", "simulate interact run"),
-    ("simulate interact", "seed", "simulate interact run"),
-    ("simulate interact", "rate", "simulate interact run"),
-    ("simulate interact", "window", "simulate interact run"),
-    ("simulate interact", "steps", "simulate interact run"),
-    ("simulate interact", "momentum", "simulate interact run"),
-    ("simulate interact", "max-norm", "simulate interact run"),
-    ("simulate interact", "deadline", "simulate interact run"),
+    ("simulate reach", "shift-at", "simulate reach reach --to 3 --cycles 1"),
+    ("simulate reach", "cycles", "simulate reach reach"),
+    ("simulate reach", "seed", "simulate reach reach --cycles 1"),
+    ("simulate interact", "trials", "simulate interact interact"),
+    ("simulate interact", "seed", "simulate interact interact"),
+    ("simulate interact", "rate", "simulate interact interact --ers --steps 1 --window 5"),
+    ("simulate interact", "window", "simulate interact interact --ers --steps 1"),
+    ("simulate interact", "steps", "simulate interact interact --ers --window 5"),
+    ("simulate interact", "momentum", "simulate interact interact --ers --steps 1 --window 5"),
+    ("simulate interact", "max-norm", "simulate interact interact --ers --steps 1 --window 5"),
+    ("simulate interact", "deadline", "simulate interact interact --ers --steps 1 --window 5"),
     ("reproduce", "seeds", "reproduce sinusoid --epochs 1 --out r --overwrite"),
     ("reproduce", "seed", "reproduce sinusoid --epochs 1 --out r --overwrite"),
     ("reproduce", "epochs", "reproduce sinusoid --out r --overwrite"),
