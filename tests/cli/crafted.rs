@@ -105,18 +105,21 @@ fn scores_and_names_in_notes_are_shown_and_do_no_harm() {
     ] {
         noting(&place, |notes| notes[key] = value.clone());
         ends(&place, "inspect run", &[0], "");
-        ends(&place, "report run", &[0], "");
+        ends(&place, "report run", &[0, 2], "");
         ends(&place, "train sine.toml --out run --epochs 30 --resume", &[0, 5], "");
     }
-    noting(&place, |notes| {
-        notes["experiment"]["name"] = json!("\u{1b}]0;pwn\u{7}<script>");
-        notes["experiment"]["training"]["optimiser"] = json!("\u{1b}[31m\u{202e}");
-    });
-    let seen = place.ok("inspect run");
-    assert!(!seen.contains(['\u{1b}', '\u{7}', '\u{202e}']), "{seen:?}");
+    noting(&place, |notes| notes["experiment"]["name"] = json!("\u{1b}]0;pwn\u{7}<script>\u{202e}"));
     place.ok("report run");
     let page = place.text("run/report.html");
     assert!(!page.contains("pwn\u{7}<script>") && !page.contains('\u{1b}'));
+    noting(&place, |notes| notes["experiment"]["training"]["optimiser"] = json!("\u{1b}[31m\u{202e}"));
+    for line in ["inspect run", "inspect run --json"] {
+        let seen = place.ok(line);
+        assert!(!seen.contains(['\u{1b}', '\u{7}', '\u{202e}']) && seen.contains("[31m"), "{seen:?}");
+    }
+    let seen = place.json("inspect run --json");
+    assert_eq!(seen["experiment"]["training"]["optimiser"], "\u{1b}[31m\u{202e}");
+    ends(&place, "report run", &[2], "unknown variant");
 }
 
 #[test]

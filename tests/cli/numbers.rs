@@ -7,11 +7,11 @@ use std::time::{Duration, Instant};
 use super::numbers_table::OPTIONS;
 use super::{Place, SINE};
 
-const VALUES: [&str; 9] =
-    ["0", "1", "-1", "2147483648", "4294967296", "9223372036854775808", "18446744073709551615", "1e308", "NaN"];
+const VALUES: [&str; 10] =
+    ["0", "1", "2", "-1", "2147483648", "4294967296", "9223372036854775808", "18446744073709551615", "1e308", "NaN"];
 
 /// Keys of the experiment file.
-const KEYS: [&str; 22] = [
+const KEYS: [&str; 35] = [
     "seed",
     "data.seed",
     "data.sequences",
@@ -28,6 +28,19 @@ const KEYS: [&str; 22] = [
     "training.adam.rate",
     "training.adam.clip_norm",
     "training.adam.batch_size",
+    "training.adam.beta1",
+    "training.adam.beta2",
+    "training.adam.epsilon",
+    "training.adam.final_rate",
+    "training.adam.initial_state_factor",
+    "training.adam.mean_factor",
+    "training.adam.warm_up",
+    "training.adam.weight_decay",
+    "training.momentum.adaptive_rate.decrease",
+    "training.momentum.adaptive_rate.increase",
+    "training.momentum.adaptive_rate.max_error_ratio",
+    "training.momentum.adaptive_rate.max_tries",
+    "data.period",
     "training.lbfgs.share",
     "training.lbfgs.memory",
     "training.on_divergence.recoveries",

@@ -16,10 +16,14 @@ fn until(what: &str, holds: impl Fn() -> bool) {
     }
 }
 
-/// A training on a terminal of its own, which `script` keeps. The shell that leads the terminal does `trap`, and writes the
-/// exit code to a file.
+/// A training on a terminal of its own, which `script` keeps. The shell that leads the terminal does `trap` when it is hung up,
+/// and writes the training's exit code to a file.
 fn on_a_terminal(place: &Place, trap: &str, arguments: &str) -> Child {
-    let line = format!("trap {trap} HUP; {SCRNN} {arguments} --threads 1; echo $? > code");
+    let line = format!(
+        "trap '' HUP; {} {SCRNN} {arguments} --threads 1 & pid=$!; trap '{trap}' HUP; wait $pid; code=$?; \
+         while kill -0 $pid 2>/dev/null; do wait $pid; code=$?; done; echo $code > code",
+        if trap.is_empty() { "" } else { "env --default-signal=HUP" }
+    );
     let mut command = Command::new("script");
     command.args(["-q", "-e", "-f", "-c", &line, "/dev/null"]).current_dir(&place.0).env("SHELL", "/bin/sh");
     command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap()
@@ -45,7 +49,7 @@ fn a_terminal_that_goes_away_ends_a_training_with_its_state_saved() {
     let place = Place::new();
     place.ok("train sine.toml --out whole --threads 1");
     fs::write(place.path("sine.toml"), SINE.replace("epochs = 1500", "epochs = 100000000")).unwrap();
-    let script = on_a_terminal(&place, ":", "train sine.toml --out run");
+    let script = on_a_terminal(&place, "kill -HUP $pid", "train sine.toml --out run");
     until("no checkpoint", || place.path("run/checkpoint.safetensors").exists());
     std::thread::sleep(Duration::from_millis(300));
     let shown = hang_up(script);
@@ -71,7 +75,7 @@ fn a_terminal_that_goes_away_ends_a_training_with_its_state_saved() {
 fn a_training_whose_hang_up_is_ignored_goes_on_without_its_terminal() {
     let place = Place::new();
     place.ok("train sine.toml --out whole --threads 1 --epochs 20000");
-    let script = on_a_terminal(&place, "''", "train sine.toml --out run --epochs 20000");
+    let script = on_a_terminal(&place, "", "train sine.toml --out run --epochs 20000");
     until("no checkpoint", || place.path("run/checkpoint.safetensors").exists());
     hang_up(script);
     assert!(!place.path("code").exists(), "the terminal went away after the training");
@@ -102,19 +106,9 @@ fn a_second_ctrl_c_ends_at_once_and_what_was_saved_remains() {
     let place = Place::with(SLOW);
     for (signal, code) in [("INT", 130), ("TERM", 143)] {
         let mut command = Command::new("env");
-        command.args([
-            "--default-signal",
-            SCRNN,
-            "train",
-            "sine.toml",
-            "--out",
-            "run",
-            "--overwrite",
-            "--threads",
-            "1",
-        ]);
+        command.args(["--default-signal", SCRNN, "train", "sine.toml", "--out", signal, "--threads", "1"]);
         let mut child = command.current_dir(&place.0).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
-        until("no checkpoint", || place.path("run/checkpoint.safetensors").exists());
+        until("no checkpoint", || place.path(signal).join("checkpoint.safetensors").exists());
         let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
         super::endings::send(&child, signal);
         assert!(lines.any(|line| line.contains("once more ends at once")), "{signal}: the first wish was not heard");
@@ -123,7 +117,8 @@ fn a_second_ctrl_c_ends_at_once_and_what_was_saved_remains() {
         assert_eq!(child.wait().unwrap().code(), Some(code), "{signal}");
         assert!(begun.elapsed() < Duration::from_millis(500), "{signal}: {:?}", begun.elapsed());
         assert!(!lines.any(|line| line.contains("is saved")), "{signal}: the epoch was over before the second wish");
-        let seen: serde_json::Value = serde_json::from_slice(&place.run("inspect run --json").stdout).unwrap();
+        let seen: serde_json::Value =
+            serde_json::from_slice(&place.run(&format!("inspect {signal} --json")).stdout).unwrap();
         assert_eq!(seen["epoch"].as_u64(), Some(0), "{signal}");
     }
 }

@@ -68,7 +68,7 @@ pub fn cut(bytes: &[u8], epoch: u64) -> Cut {
     let text = String::from_utf8_lossy(bytes);
     let mut found = Cut::default();
     let mut lines = text.split_inclusive('\n').enumerate().skip(1);
-    for (number, line) in lines.by_ref() {
+    while let Some((number, line)) = lines.next() {
         let whole = line.ends_with('\n');
         match row_of(line) {
             Some((row, seconds)) if whole && row <= epoch && found.last.is_none_or(|(last, _)| row > last) => {

@@ -233,7 +233,7 @@ impl<R: BufRead> Stream<R> {
             return Ok(f64::NAN);
         }
         cell.parse().map_err(|_| {
-            let (channel, cell) = (&self.channels[channel], shown(cell).escape_debug());
+            let (channel, cell) = (&self.channels[channel], shown(cell).escape_debug().to_string());
             Failure::input(
                 format!("line {}, {channel} is `{cell}`", self.number),
                 "a number, or nothing if it is missing",
@@ -254,7 +254,7 @@ impl<R: BufRead> Stream<R> {
             .or_else(|error| serde_json::from_str(&without_non_finite(line)).map_err(|_| error))
             .map_err(|error| refused(format!("is no JSON object: {error}")))?;
         let mut keys = HashSet::new();
-        if let Some((twice, _)) = object.iter().find(|(key, _)| !keys.insert(key)) {
+        if let Some((twice, _)) = object.iter().find(|&(key, _)| !keys.insert(key)) {
             return Err(refused(format!("has `{}` more than once", shown(twice))));
         }
         let value = |wanted: &str| object.iter().find(|(key, _)| key == wanted).map(|(_, value)| value);

@@ -148,7 +148,10 @@ fn times_at_the_ends_of_their_range_are_refused_or_give_samples() {
                 continue;
             };
             let values = reading.data.sequences().iter().flat_map(|sequence| sequence.values());
-            assert!(reading.data.total_samples() > 0 && values.clone().all(|&value| value == 1.5), "{times:?} {period:?}");
+            assert!(
+                reading.data.total_samples() > 0 && values.clone().all(|&value| value == 1.5),
+                "{times:?} {period:?}"
+            );
             assert!(reading.period.is_none_or(|period| period > 0.0 && period.is_finite()), "{times:?} {period:?}");
         }
     }

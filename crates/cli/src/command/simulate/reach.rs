@@ -11,7 +11,7 @@ use scrnn_sim::reaching::{CYCLE, POSITIONS};
 use scrnn_sim::reaching_recording::ReachingRecording;
 use scrnn_sim::touching::Cycle;
 use scrnn_sim::world::WorldOptions;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::args::Shared;
 use crate::output;
