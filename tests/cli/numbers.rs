@@ -87,6 +87,8 @@ fn every_numeric_option_takes_a_value_or_refuses_it_and_never_panics() {
     let place = Place::with(&SINE.replace("epochs = 120", "epochs = 5"));
     place.ok("train sine.toml --out run -q");
     place.ok("data sinusoid --steps 20 --seed 3 --out new.csv -q");
+    let rows: String = (0..20).map(|k| format!("{k},{:?}\n", (0.3 * f64::from(k)).sin())).collect();
+    place.write("timed.csv", format!("time,y\n{rows}"));
     place.write("sine.toml", super::reaching::REACH.replace("epochs = 300", "epochs = 2"));
     place.ok("train sine.toml --out reach -q");
     place.write("sine.toml", super::following::INTERACT.replace("epochs = 5", "epochs = 2"));

@@ -1,4 +1,4 @@
-//! Every numeric option, with a command on tiny inputs that uses it: the runs `run`, `reach` and `interact`, and `new.csv`.
+//! Every numeric option, with a command on tiny inputs that uses it: the runs `run`, `reach` and `interact`, `new.csv` and `timed.csv`.
 
 /// Command, option, and a line that needs only this option's value to be whole.
 pub const OPTIONS: &[(&str, &str, &str)] = &[
@@ -13,8 +13,8 @@ pub const OPTIONS: &[(&str, &str, &str)] = &[
     ("generate", "steps", "generate run"),
     ("generate", "samples", "generate run --steps 2"),
     ("generate", "seed", "generate run --steps 2"),
-    ("generate", "period", "generate run --mode open --data new.csv"),
-    ("recognize", "period", "recognize run new.csv"),
+    ("generate", "period", "generate run --mode open --data timed.csv"),
+    ("recognize", "period", "recognize run timed.csv --starts 1 --epochs 1"),
     ("recognize", "starts", "recognize run new.csv --epochs 1"),
     ("recognize", "epochs", "recognize run new.csv --starts 1"),
     ("recognize", "observed", "recognize run new.csv --starts 1 --epochs 1"),
@@ -42,6 +42,6 @@ pub const OPTIONS: &[(&str, &str, &str)] = &[
     ("reproduce", "seed", "reproduce sinusoid --epochs 1 --out r --overwrite"),
     ("reproduce", "epochs", "reproduce sinusoid --out r --overwrite"),
     ("report", "seed", "report run"),
-    ("convert", "period", "convert new.csv converted.npz"),
-    ("inspect", "period", "inspect new.csv"),
+    ("convert", "period", "convert timed.csv converted.npz"),
+    ("inspect", "period", "inspect timed.csv"),
 ];
