@@ -6,7 +6,7 @@ pub const OPTIONS: &[(&str, &str, &str)] = &[
     ("data", "seed", "data sinusoid --steps 10"),
     ("data", "sequences", "data sinusoid --steps 10"),
     ("data", "steps", "data sinusoid --sequences 1"),
-    ("train", "period", "train sine.toml --out t --overwrite --epochs 1"),
+    ("train", "period", "train sine.toml --files timed.csv --out t --overwrite --epochs 1"),
     ("train", "epochs", "train sine.toml --out t --overwrite"),
     ("train", "seed", "train sine.toml --out t --overwrite --epochs 1"),
     ("generate", "mixing", "generate run --mode mixed --steps 5"),
