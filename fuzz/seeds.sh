@@ -5,7 +5,7 @@
 set -eu
 scrnn=$(realpath "${1:-target/release/scrnn}")
 cd "$(dirname "$0")"
-for target in table npy npz mcap sqlite cdr protobuf bag experiment checkpoint urdf parquet hdf5 mat bvh series; do mkdir -p "corpus/$target"; done
+for target in table npy npz mcap sqlite cdr protobuf bag experiment checkpoint urdf parquet hdf5 mat bvh series stream history notes; do mkdir -p "corpus/$target"; done
 for kind in csv tsv txt; do "$scrnn" data lissajous --sequences 2 --steps 4 --out "corpus/table/x.$kind" -q; done
 rm -f corpus/*/*.truth.*
 printf 'sequence;step;y 1;"y ""2"""\na;1;0,5;2\na;2;1;3\n\nb;1;nan;-1e9\n' > corpus/table/semicolons
@@ -36,3 +36,10 @@ cp "$fixtures"/mat/*.mat "$fixtures"/hdf5/matlab.mat corpus/mat/
 printf 'HIERARCHY\nROOT a b\n{\nOFFSET 0 0 0\nCHANNELS 2 Xposition Zrotation\nEnd Site\n{\n}\n}\nMOTION\nFrames: 2\nFrame Time: 0.02\n1 2\n3 -4e1\n' > corpus/bvh/small
 printf '@dimensions 2\n@timeStamps false\n@classLabel true a b\n@data\n1,2:3,?:a\n5:6:b\n' > corpus/series/plain
 printf '@timeStamps true\n@classLabel false\n@data\n(0,1),(0.5,2)\n' > corpus/series/times
+printf '# a\na,b\n1,2\n,3\nNaN;1e400\n\n1 2\n' > corpus/stream/names
+printf '{"a":1,"b":null,"time":{"sec":1}}\n{"b":NaN,"a":-1e400}\n' > corpus/stream/objects
+printf '{"header":{},"name":["b","a"],"position":[2,1]}\n{"name":[],"position":[]}\n' > corpus/stream/joints
+printf 'sequence\tstep\ty1\ty2\none\t1\t1\t2\ntwo\t1\t3\t"4"\n5\t6' > corpus/stream/sequences
+cp ../tests/golden/run/history.csv corpus/history/
+printf 'epoch,nll,mse,rate_shared,rate_initial,gradient_norm,seconds\n0,,1,1,1,1,0.5\n5,inf,nan,1,1,1,1\n' > corpus/history/old
+cp corpora/notes.json corpus/notes/

@@ -2,6 +2,8 @@
 
 #[path = "cli/channels.rs"]
 mod channels;
+#[path = "cli/crafted.rs"]
+mod crafted;
 #[path = "cli/experiments.rs"]
 mod experiments;
 #[path = "cli/extremes.rs"]

@@ -11,6 +11,8 @@
 mod endings;
 #[path = "crash/outputs.rs"]
 mod outputs;
+#[path = "crash/terminals.rs"]
+mod terminals;
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -120,6 +120,25 @@ pub fn checkpoint(bytes: &[u8]) {
     });
 }
 
+/// Samples that come line by line.
+pub fn stream(bytes: &[u8]) {
+    for channels in [&["a", "b"][..], &["y1"]] {
+        bounded(bytes, 400, || readers::stream(bytes, channels));
+    }
+}
+
+/// The history of a run that goes on.
+pub fn history(bytes: &[u8]) {
+    for epoch in [0, 100, u64::MAX] {
+        bounded(bytes, 50, || readers::history(bytes, epoch));
+    }
+}
+
+/// The notes of a checkpoint whose run is to go on.
+pub fn notes(bytes: &[u8]) {
+    bounded(bytes, 1000, || readers::notes(bytes));
+}
+
 /// A robot's description.
 pub fn urdf(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };

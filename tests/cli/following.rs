@@ -193,7 +193,7 @@ fn requests_that_do_not_go_together_are_refused() {
     for (line, expected) in [
         ("recognize run new.csv --window 5", "go with --online"),
         ("recognize run new.csv --online --optimiser adam --momentum 0.5", "--momentum does not go with"),
-        ("recognize run new.csv --online --deadline 0", "--deadline is 0"),
+        ("recognize run new.csv --online --deadline 0", "give a number above 0"),
         ("recognize run new.csv --online --sequence 7", "there is no learned sequence 7"),
         ("recognize run new.csv --online --closed-channels z", "no channel `z`"),
         ("recognize run new.csv --online --window 0", "from 1 to 1000000"),
@@ -207,7 +207,7 @@ fn requests_that_do_not_go_together_are_refused() {
     }
 }
 
-const INTERACT: &str = r#"
+pub const INTERACT: &str = r#"
 name = "interact"
 [data]
 task = "interact"

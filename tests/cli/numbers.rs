@@ -1,16 +1,17 @@
 //! Numbers that people may type: each option and key at the ends of what can be written.
 
+use std::collections::BTreeSet;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use super::numbers_table::OPTIONS;
 use super::{Place, SINE};
 
-const VALUES: [&str; 9] =
-    ["0", "1", "-1", "2147483648", "4294967296", "9223372036854775808", "18446744073709551615", "1e308", "NaN"];
+const VALUES: [&str; 10] =
+    ["0", "1", "2", "-1", "2147483648", "4294967296", "9223372036854775808", "18446744073709551615", "1e308", "NaN"];
 
 /// Keys of the experiment file.
-const KEYS: [&str; 22] = [
+const KEYS: [&str; 35] = [
     "seed",
     "data.seed",
     "data.sequences",
@@ -27,6 +28,19 @@ const KEYS: [&str; 22] = [
     "training.adam.rate",
     "training.adam.clip_norm",
     "training.adam.batch_size",
+    "training.adam.beta1",
+    "training.adam.beta2",
+    "training.adam.epsilon",
+    "training.adam.final_rate",
+    "training.adam.initial_state_factor",
+    "training.adam.mean_factor",
+    "training.adam.warm_up",
+    "training.adam.weight_decay",
+    "training.momentum.adaptive_rate.decrease",
+    "training.momentum.adaptive_rate.increase",
+    "training.momentum.adaptive_rate.max_error_ratio",
+    "training.momentum.adaptive_rate.max_tries",
+    "data.period",
     "training.lbfgs.share",
     "training.lbfgs.memory",
     "training.on_divergence.recoveries",
@@ -56,7 +70,8 @@ fn ends(place: &Place, line: &str, within: Duration) -> (Option<i32>, String) {
     (code, String::from_utf8_lossy(&std::fs::read(&log).unwrap()).into_owned())
 }
 
-fn check(place: &Place, line: &str, codes: &[i32], is_long: bool) {
+/// The exit code, which is none if the line was still at work.
+fn check(place: &Place, line: &str, codes: &[i32], is_long: bool) -> Option<i32> {
     let within = if is_long { Duration::from_millis(500) } else { Duration::from_secs(60) };
     let (code, told) = ends(place, line, within);
     assert!(!told.contains("panicked") && !told.contains("allocation"), "{line}: {told}");
@@ -64,6 +79,7 @@ fn check(place: &Place, line: &str, codes: &[i32], is_long: bool) {
         Some(code) => assert!(codes.contains(&code), "{line}: exit code {code}, {told}"),
         None => assert!(is_long, "{line} does not end: {told}"),
     }
+    code
 }
 
 #[test]
@@ -71,11 +87,20 @@ fn every_numeric_option_takes_a_value_or_refuses_it_and_never_panics() {
     let place = Place::with(&SINE.replace("epochs = 120", "epochs = 5"));
     place.ok("train sine.toml --out run -q");
     place.ok("data sinusoid --steps 20 --seed 3 --out new.csv -q");
-    for (_, option, line) in OPTIONS {
-        for value in VALUES {
-            // Whoever asks for 2^31 epochs of training gets them.
-            check(&place, &format!("{line} --{option}={value}"), &[0, 2], *option == "epochs");
-        }
+    let rows: String = (0..20).map(|k| format!("{k},{:?}\n", (0.3 * f64::from(k)).sin())).collect();
+    place.write("timed.csv", format!("time,y\n{rows}"));
+    place.write("sine.toml", super::reaching::REACH.replace("epochs = 300", "epochs = 2"));
+    place.ok("train sine.toml --out reach -q");
+    place.write("sine.toml", super::following::INTERACT.replace("epochs = 5", "epochs = 2"));
+    place.ok("train sine.toml --out interact -q");
+    place.write("sine.toml", SINE.replace("epochs = 120", "epochs = 5"));
+    for (command, option, line) in OPTIONS {
+        // Whoever asks for 2^31 epochs of training gets them.
+        let is_long = *option == "epochs";
+        let codes = VALUES.map(|value| check(&place, &format!("{line} --{option}={value}"), &[0, 2], is_long));
+        // A line that is refused whatever the number would prove nothing, nor would one that takes NaN.
+        assert!(codes.contains(&Some(0)) || is_long && codes.contains(&None), "{command} --{option}: {codes:?}");
+        assert_eq!(codes[VALUES.len() - 1], Some(2), "{command} --{option}=NaN");
     }
 }
 
@@ -91,6 +116,34 @@ fn every_numeric_key_takes_a_value_or_is_refused_and_never_panics() {
             check(&place, &line, &[0, 2, 3], key == "training.epochs");
         }
     }
+}
+
+/// The last parts of all keys of the experiment file that are numbers.
+fn numeric_keys(schema: &serde_json::Value, found: &mut BTreeSet<String>) {
+    let serde_json::Value::Object(entries) = schema else {
+        schema.as_array().into_iter().flatten().for_each(|entry| numeric_keys(entry, found));
+        return;
+    };
+    let is_number = |schema: &serde_json::Value| {
+        let text = schema["type"].to_string();
+        text.contains("number") || text.contains("integer")
+    };
+    for (key, below) in schema["properties"].as_object().into_iter().flatten() {
+        if is_number(below) {
+            found.insert(key.clone());
+        }
+    }
+    entries.values().for_each(|below| numeric_keys(below, found));
+}
+
+#[test]
+fn every_numeric_key_of_the_schema_is_in_the_table() {
+    let place = Place::new();
+    let mut found = BTreeSet::new();
+    numeric_keys(&serde_json::from_str(&place.ok("schema")).unwrap(), &mut found);
+    let listed: BTreeSet<&str> = KEYS.iter().filter_map(|key| key.rsplit('.').next()).collect();
+    let missing: Vec<_> = found.iter().filter(|key| !listed.contains(key.as_str())).collect();
+    assert!(missing.is_empty() && found.len() > 15, "{missing:?}");
 }
 
 #[test]

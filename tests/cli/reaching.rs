@@ -4,7 +4,7 @@
 use crate::{Place, numbers};
 
 /// A network that has seen a little of three short demonstrations.
-const REACH: &str = "name = \"reach\"\n[data]\ntask = \"reach\"\nsequences = 3\nsteps = 30\n[network]\n\
+pub const REACH: &str = "name = \"reach\"\n[data]\ntask = \"reach\"\nsequences = 3\nsteps = 30\n[network]\n\
                      initial_state_variance = 0.001\n[[network.groups]]\nname = \"c\"\nunits = 8\ntime_constant = 2.0\n\
                      [training]\nepochs = 300\noptimiser = \"adam\"\n[training.adam]\nrate = 0.01\n";
 

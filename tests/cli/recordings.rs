@@ -92,7 +92,7 @@ fn what_a_recording_holds_is_shown_and_what_it_lacks_is_said() {
     let (_, told) = place.fails(2, "inspect arm.mcap --channels nose");
     assert!(told.contains("arm.mcap, topic /sensed: there is no channel `nose`"), "{told}");
     let (_, told) = place.fails(2, "inspect arm.mcap --period 0");
-    assert!(told.contains("a number of seconds from 1e-9"), "{told}");
+    assert!(told.contains("give a number from 1e-9 to 1e9"), "{told}");
     let bytes = place.read("arm.mcap");
     place.write("cut.mcap", &bytes[..bytes.len() / 2]);
     let (_, told) = place.fails(2, "inspect cut.mcap");

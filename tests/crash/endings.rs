@@ -1,6 +1,7 @@
 //! Streams that nobody reads or that are full, and signals: what a training does about them.
 
 use std::fs::{self, File};
+use std::io::Write;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -27,6 +28,36 @@ fn a_training_whose_stderr_is_a_closed_pipe_or_a_full_disk_comes_to_the_same_bit
         let told = place.run(line).status.code();
         assert_eq!(place.command(line).stderr(full()).status().unwrap().code(), told, "{line}");
     }
+}
+
+/// A pipe that is full, and that nobody reads: what is said waits, the training does not.
+#[test]
+fn a_training_whose_stderr_nobody_reads_comes_to_the_same_bits() {
+    let place = Place::new();
+    place.ok("train sine.toml --out whole");
+    let (reader, writer) = std::io::pipe().unwrap();
+    let mut filling = writer.try_clone().unwrap();
+    let filler = std::thread::spawn(move || while filling.write_all(&[b'x'; 4096]).is_ok() {});
+    std::thread::sleep(Duration::from_millis(300));
+    for (line, code) in [("train sine.toml --out run", 0), ("train none.toml", 4), ("train --nonsense", 2)] {
+        let mut command = place.command(line);
+        let mut child = command.stdout(Stdio::null()).stderr(writer.try_clone().unwrap()).spawn().unwrap();
+        let begun = Instant::now();
+        let status = loop {
+            if let Some(status) = child.try_wait().unwrap() {
+                break status;
+            }
+            if begun.elapsed() > Duration::from_secs(60) {
+                child.kill().unwrap();
+                panic!("{line} waits for whoever reads its stderr");
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        };
+        assert_eq!(status.code(), Some(code), "{line}");
+    }
+    same(&place, "whole", "run");
+    drop((reader, writer));
+    filler.join().unwrap();
 }
 
 #[test]
@@ -64,7 +95,8 @@ fn endless(script: &str) -> (Place, Child) {
     (place, child)
 }
 
-fn send(child: &Child, signal: &str) {
+/// Sends a signal, by its name, as a shell does.
+pub fn send(child: &Child, signal: &str) {
     let status = Command::new("sh").args(["-c", &format!("kill -{signal} {}", child.id())]).status().unwrap();
     assert!(status.success(), "{signal}");
 }

@@ -22,7 +22,7 @@ const FILES: &str = "Options for data files";
 /// Options of every command.
 #[derive(Debug, Args)]
 pub struct Shared {
-    /// Threads to work with, at most 1024; 0 takes one for each core. The result is the same to the bit
+    /// Threads to work with, 0 to 1024; 0 takes one for each core. The result is the same to the bit
     #[arg(long, global = true, value_name = "N", default_value_t = 0, hide_default_value = true, help_heading = SHARED,
         value_parser = count(0, 1024))]
     pub threads: usize,
@@ -68,8 +68,8 @@ pub struct Part {
     /// What tells when a sample was taken; `rows` takes rows and messages as even steps [default: the best there is]
     #[arg(long, help_heading = FILES, value_name = "CLOCK", value_parser = clocks())]
     pub time: Option<TimeSource>,
-    /// Bring recordings, and tables with a clock, to samples this many seconds apart, on straight lines between them
-    #[arg(long, help_heading = FILES, value_name = "SECONDS", value_parser = period)]
+    /// Bring recordings, and tables with a clock, to samples this many seconds apart, 1e-9 to 1e9, on straight lines between them
+    #[arg(long, help_heading = FILES, value_name = "SECONDS", value_parser = number(1e-9, 1e9))]
     pub period: Option<f64>,
     /// The channels to take, by their names [default: all]
     #[arg(long, help_heading = FILES, value_name = "NAME,...", value_delimiter = ',')]
@@ -85,6 +85,9 @@ pub struct Part {
     pub unwrap: Vec<String>,
 }
 
+/// The largest whole number of a TOML file: experiments cannot note larger ones.
+pub const MOST_IN_TOML: u64 = i64::MAX as u64;
+
 /// A parser for numbers of things, which says its range.
 pub fn count(least: usize, most: usize) -> impl Fn(&str) -> std::result::Result<usize, String> + Clone + Send + Sync {
     move |text| match text.parse::<usize>() {
@@ -93,18 +96,38 @@ pub fn count(least: usize, most: usize) -> impl Fn(&str) -> std::result::Result<
     }
 }
 
+/// A parser for whole numbers that may be large, which says their range.
+pub fn whole(least: u64, most: u64) -> impl Fn(&str) -> std::result::Result<u64, String> + Clone + Send + Sync {
+    move |text| match text.parse::<u64>() {
+        Ok(number) if (least..=most).contains(&number) => Ok(number),
+        _ => Err(format!("give a whole number from {least} to {most}")),
+    }
+}
+
+/// A parser for seeds: any number of 64 bits.
+pub fn seed() -> impl Fn(&str) -> std::result::Result<u64, String> + Clone + Send + Sync {
+    whole(0, u64::MAX)
+}
+
+/// A parser for numbers between two, which says its range.
+pub fn number(least: f64, most: f64) -> impl Fn(&str) -> std::result::Result<f64, String> + Clone + Send + Sync {
+    move |text| match text.parse::<f64>() {
+        Ok(value) if (least..=most).contains(&value) => Ok(value),
+        _ => Err(format!("give a number from {} to {}", plain(least), plain(most))),
+    }
+}
+
+/// A number as people write it.
+fn plain(value: f64) -> String {
+    if value == 0.0 || (1e-4..1e6).contains(&value.abs()) { value.to_string() } else { format!("{value:e}") }
+}
+
 /// A parser for positive numbers up to a bound, which says its range.
 pub fn positive(most: f64) -> impl Fn(&str) -> std::result::Result<f64, String> + Clone + Send + Sync {
     move |text| match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value <= most => Ok(value),
         _ => Err(format!("give a number above 0, at most {most:e}")),
     }
-}
-
-fn period(text: &str) -> std::result::Result<f64, String> {
-    let period: f64 = text.parse().map_err(|_| "give a number of seconds".to_owned())?;
-    let fits = (1e-9..=1e9).contains(&period);
-    if fits { Ok(period) } else { Err("give a number of seconds from 1e-9 to 1e9".to_owned()) }
 }
 
 impl Part {

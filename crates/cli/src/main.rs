@@ -8,6 +8,7 @@ mod outputs;
 mod progress;
 mod signals;
 
+use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -17,9 +18,16 @@ use scrnn_run::failure::{Ending, Failure, Result};
 use signals::Signals;
 
 fn main() -> ExitCode {
+    let code = run();
+    output::finish();
+    ExitCode::from(code)
+}
+
+/// Does what the command line says; the exit code.
+fn run() -> u8 {
     let Cli { shared, command } = match Cli::try_parse() {
         Ok(cli) => cli,
-        Err(usage) => return ExitCode::from(told(&usage)),
+        Err(usage) => return told(&usage),
     };
     let signals = Signals::default();
     let ending = match command {
@@ -35,11 +43,15 @@ fn main() -> ExitCode {
         Command::Schema => command::schema::run(),
         Command::Completions(arguments) => command::completions::run(&arguments),
     };
-    ExitCode::from(code(ending, signals.code()))
+    code(ending, signals.code())
 }
 
 /// Shows help, version or what is wrong with the arguments; the exit code.
 fn told(usage: &clap::Error) -> u8 {
+    if usage.use_stderr() && !std::io::stderr().is_terminal() {
+        output::say(usage.render().to_string().trim_end());
+        return u8::try_from(usage.exit_code()).unwrap_or(2);
+    }
     match usage.print() {
         // The text to stdout is a result; on stderr it is a message.
         Err(source) if !usage.use_stderr() && source.kind() != std::io::ErrorKind::BrokenPipe => {

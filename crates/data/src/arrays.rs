@@ -13,6 +13,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::budget::{Budget, OverBudget};
 use crate::natural::natural;
 use crate::reading::Topic;
 use crate::remark::Remark;
@@ -80,7 +81,7 @@ const CHANNEL_NAMES: &[&str] = &[npz::CHANNELS, "channel_names", "joint_names"];
 /// # Errors
 /// [`FileError::Array`] where it is not clear what is meant, with what to type.
 pub fn to_samples(
-    path: &str,
+    (path, budget): (&str, &Budget),
     mut arrays: Vec<Array>,
     texts: &[Texts],
     selection: &Selection,
@@ -123,7 +124,8 @@ pub fn to_samples(
             }
             Samples::numbered(channels, tracks)
         }
-        Plan::Groups(sequences) => groups(arrays, sequences, &mut remarks),
+        Plan::Groups(sequences) => groups(arrays, sequences, budget, &mut remarks)
+            .map_err(|problem| FileError::OverBudget { path: path.to_owned(), problem })?,
     };
     if let Some((name, values)) = clock {
         let [track] = samples.tracks.as_mut_slice() else { return Ok(samples) };
@@ -477,7 +479,15 @@ fn reordered(shape: &[usize], axes: Axes, values: &[f64]) -> Vec<f64> {
 }
 
 /// Arrays side by side, for each sequence.
-fn groups(arrays: Vec<Array>, sequences: Vec<(String, Vec<usize>)>, remarks: &mut Vec<Remark>) -> Samples {
+///
+/// # Errors
+/// [`OverBudget`]: a long name may stand for thousands of channels, and each of them has it in its own.
+fn groups(
+    arrays: Vec<Array>,
+    sequences: Vec<(String, Vec<usize>)>,
+    budget: &Budget,
+    remarks: &mut Vec<Remark>,
+) -> Result<Samples, OverBudget> {
     let mut channels = Vec::new();
     let mut tracks: Vec<Track> = Vec::new();
     let one = sequences.len() == 1;
@@ -490,6 +500,7 @@ fn groups(arrays: Vec<Array>, sequences: Vec<(String, Vec<usize>)>, remarks: &mu
             } else {
                 array.name.trim_end_matches(|c: char| c.is_ascii_digit()).trim_end_matches(['_', '-', '.', '/'])
             };
+            budget.take(channels_of(&array.shape[1..]).saturating_mul(stem.len() + 64))?;
             names_below(stem, &array.shape[1..], &mut channels);
             groups.push(stem.to_owned());
         }
@@ -516,7 +527,7 @@ fn groups(arrays: Vec<Array>, sequences: Vec<(String, Vec<usize>)>, remarks: &mu
         tracks.push(Track { name, values, times: Vec::new() });
     }
     let sequences = tracks.into_iter().map(|track| (track.name, track.values)).collect();
-    Samples::named(channels, sequences)
+    Ok(Samples::named(channels, sequences))
 }
 
 /// `qpos.0`, `qpos.1`, ... for each place below the first axis; `x` itself if there is none.

@@ -2,7 +2,8 @@
 //!
 //! A small file can promise, unpack to, or name again and again, far more than it has bytes. Every reader draws all that
 //! it allocates on behalf of a file on one [`Budget`], names included, and stops when that is spent. Time follows: what
-//! is not held is not worked on.
+//! is not held is not worked on. What is unpacked and given back again counts as work, which has a bound of its own: parts of a
+//! file that many others point to would be unpacked for each of them.
 
 use std::cell::Cell;
 
@@ -17,7 +18,11 @@ const RATIO: u64 = 2100;
 pub struct Budget {
     allowed: u64,
     held: Cell<u64>,
+    worked: Cell<u64>,
 }
+
+/// Times that all that a file may be turned into may be unpacked: once to look, once to read, and once more.
+const LOOKS: u64 = 3;
 
 /// A file that would be turned into more than it may.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -39,7 +44,7 @@ impl Budget {
     /// This many bytes.
     #[must_use]
     pub fn of(allowed: u64) -> Self {
-        Self { allowed, held: Cell::new(0) }
+        Self { allowed, held: Cell::new(0), worked: Cell::new(0) }
     }
 
     /// Takes bytes before they are allocated. They stay taken until [`Self::give_back`].
@@ -82,6 +87,20 @@ impl Budget {
         Ok(text.to_owned())
     }
 
+    /// Takes bytes that are to be unpacked. They may be given back, the work may not.
+    ///
+    /// # Errors
+    /// [`OverBudget`], and nothing is taken.
+    pub fn unpack(&self, bytes: usize) -> Result<(), OverBudget> {
+        let (worked, most) = (self.worked.get().saturating_add(bytes as u64), self.allowed.saturating_mul(LOOKS));
+        if worked > most {
+            return Err(OverBudget { needed: worked, allowed: most });
+        }
+        self.take(bytes)?;
+        self.worked.set(worked);
+        Ok(())
+    }
+
     /// Gives back bytes that are held no longer.
     pub fn give_back(&self, bytes: usize) {
         self.held.set(self.held.get().saturating_sub(bytes as u64));
@@ -108,6 +127,18 @@ mod tests {
         assert_eq!(budget.text("a much too long name for what is left of it").map_err(|e| e.allowed), Err(100));
         assert_eq!(budget.take(usize::MAX).map_err(|error| error.needed), Err(u64::MAX));
         assert_eq!(budget.left(), 80);
+    }
+
+    #[test]
+    fn what_is_given_back_may_not_be_unpacked_for_ever() {
+        let budget = Budget::of(100);
+        for _ in 0..6 {
+            budget.unpack(50).unwrap();
+            budget.give_back(50);
+        }
+        assert_eq!((budget.unpack(1), budget.left()), (Err(OverBudget { needed: 301, allowed: 300 }), 100));
+        assert_eq!(Budget::of(100).unpack(101), Err(OverBudget { needed: 101, allowed: 100 }));
+        Budget::of(u64::MAX).unpack(usize::MAX).unwrap();
     }
 
     #[test]

@@ -27,6 +27,18 @@ pub enum FileError {
         help: Option<&'static str>,
     },
 
+    /// More bytes than can be held.
+    #[error("{path} has more than the {most} MB that {what}")]
+    #[diagnostic(help("give a smaller file, or a part of it"))]
+    TooLarge {
+        /// The file.
+        path: String,
+        /// What would fit.
+        most: u64,
+        /// What of.
+        what: &'static str,
+    },
+
     /// The extension does not tell a format.
     #[error("the name of {path} does not tell what the file holds")]
     #[diagnostic(help("data files end in {known}"))]

@@ -18,7 +18,10 @@ pub fn expand(pattern: &Path) -> Result<Vec<PathBuf>, FileError> {
         && !Format::knows(only)
     {
         let folder = only.clone();
-        found = entries(&folder)?.into_iter().filter(|path| is_visible(path) && Format::knows(path)).collect();
+        found = entries(&folder)?
+            .into_iter()
+            .filter(|path| is_visible(path) && ends(path) && Format::knows(path))
+            .collect();
         if found.is_empty() {
             return Err(FileError::NoMatch {
                 pattern: folder.display().to_string(),
@@ -28,6 +31,11 @@ pub fn expand(pattern: &Path) -> Result<Vec<PathBuf>, FileError> {
     }
     found.sort_by(|a, b| natural(&a.to_string_lossy(), &b.to_string_lossy()));
     Ok(found)
+}
+
+/// Whether a path leads to a file or a folder. Nobody means a pipe or a device, which may have no end, by a folder it is in.
+fn ends(path: &Path) -> bool {
+    path.is_file() || path.is_dir()
 }
 
 fn is_visible(path: &Path) -> bool {
@@ -66,7 +74,7 @@ fn matches(pattern: &Path) -> Result<Vec<PathBuf>, FileError> {
         }
         found = next;
     }
-    found.retain(|path| path.exists());
+    found.retain(|path| ends(path));
     if found.is_empty() {
         return Err(FileError::NoMatch { pattern: pattern.display().to_string(), what: "no file matches" });
     }

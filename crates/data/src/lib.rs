@@ -39,6 +39,7 @@ mod joining;
 mod lerobot;
 mod literal;
 mod mat;
+pub mod memory;
 mod natural;
 mod npy;
 mod npz;
@@ -68,6 +69,7 @@ pub use recording::RecordingProblem;
 pub use remark::{Level, Remark};
 pub use replace::{HALF_WRITTEN, is_one_file, replace, sweep};
 pub use selection::{Axes, Missing, Selection, TimeSource};
+pub use source::read_bytes;
 pub use table::unguarded;
 
 use format::Format;

@@ -48,7 +48,7 @@ pub fn read(source: &Source<'_>, selection: &Selection) -> Result<Samples, FileE
     let count: usize = contents.arrays.iter().map(|array| array.values.len()).sum();
     // What stands side by side is copied.
     source.budget().take_values::<f64>(count).map_err(|problem| at(problem.into()))?;
-    let mut samples = to_samples(source.name(), contents.arrays, &contents.texts, selection)?;
+    let mut samples = to_samples((source.name(), source.budget()), contents.arrays, &contents.texts, selection)?;
     let left_out = contents.others.into_iter().map(|(column, what)| Remark::LeftOut { column, what: what.to_owned() });
     samples.remarks.extend(left_out);
     Ok(samples)

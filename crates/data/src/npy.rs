@@ -66,7 +66,7 @@ pub fn read(source: &Source<'_>, selection: &Selection) -> Result<Samples, FileE
                 let needed = "at least one axis";
                 return Err(file_error(path, path, ArrayProblem::Shape { found: shape_text(shape), needed }.into()));
             }
-            to_samples(path, arrays, &[] as &[Texts], selection)
+            to_samples((path, source.budget()), arrays, &[] as &[Texts], selection)
         }
         Contents::Texts(_) => Err(wrong("text".to_owned())),
         Contents::Other(found) => Err(wrong(found)),
@@ -314,7 +314,10 @@ fn kind(descr: &Literal) -> Result<Kind, ArrayProblem> {
         };
         let Some(of) = of.text() else { return Ok(Kind::Other("records within records".to_owned())) };
         let shape = match parts.get(2) {
-            Some(shape) => shape.lengths().ok_or(ArrayProblem::Header("a field's shape is not a tuple of lengths"))?,
+            Some(shape) => shape
+                .lengths()
+                .filter(|lengths| lengths.len() <= 32)
+                .ok_or(ArrayProblem::Header("a field's shape is not a tuple of up to 32 lengths"))?,
             None => Vec::new(),
         };
         let each = shape.iter().try_fold(1_usize, |product, &length| product.checked_mul(length));

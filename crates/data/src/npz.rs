@@ -55,10 +55,13 @@ pub fn read(source: &Source<'_>, selection: &Selection) -> Result<Samples, FileE
             Ok(Contents::Arrays(parts)) if parts.len() == 1 && parts[0].name.is_empty() => {
                 arrays.extend(parts.into_iter().map(|array| crate::arrays::Array { name: name.clone(), ..array }));
             }
-            Ok(Contents::Arrays(parts)) => arrays.extend(parts.into_iter().map(|mut array| {
-                array.name = format!("{name}.{}", array.name);
-                array
-            })),
+            Ok(Contents::Arrays(parts)) => {
+                budget.take(parts.len().saturating_mul(name.len() + 64)).map_err(over)?;
+                arrays.extend(parts.into_iter().map(|mut array| {
+                    array.name = format!("{name}.{}", array.name);
+                    array
+                }));
+            }
             Ok(Contents::Texts(all)) => texts.push(Texts { name, texts: all }),
             Ok(Contents::Other(found)) => {
                 remarks.push(Remark::LeftOut { column: name, what: format!("elements of type {found}") });
@@ -83,7 +86,7 @@ pub fn read(source: &Source<'_>, selection: &Selection) -> Result<Samples, FileE
     // What stands side by side is copied.
     let count = arrays.iter().map(|array| array.values.len()).sum();
     budget.take_values::<f64>(count).map_err(over)?;
-    let mut samples = to_samples(path, arrays, &texts, selection)?;
+    let mut samples = to_samples((path, budget), arrays, &texts, selection)?;
     samples.remarks.extend(remarks);
     Ok(samples)
 }

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use crate::FileError;
 use crate::budget::Budget;
+use crate::memory;
 
 /// What is to be read: a file or a folder on the disk, or bytes that would stand in a file.
 pub struct Source<'a> {
@@ -13,6 +14,38 @@ pub struct Source<'a> {
     name: String,
     bytes: Option<&'a [u8]>,
     budget: Budget,
+}
+
+/// Bytes that are taken from what is no file: a pipe, a device. Nobody knows whether there is an end.
+const MOST_OF_NO_FILE: u64 = 256 << 20;
+
+/// All bytes of a file that is known to end and to fit.
+///
+/// # Errors
+/// [`FileError::TooLarge`] for more bytes than the machine's memory has, and for a pipe or a device without an end;
+/// [`FileError::Disk`].
+pub fn read_bytes(path: &Path) -> Result<Vec<u8>, FileError> {
+    let disk = |source| FileError::disk("read", path, source);
+    let found = std::fs::metadata(path).map_err(disk)?;
+    let too_large = |most: u64, what: &'static str| FileError::TooLarge {
+        path: path.display().to_string(),
+        most: most >> 20,
+        what,
+    };
+    if found.is_file() || found.is_dir() {
+        let most = memory::of_machine().unwrap_or(u64::MAX >> 1);
+        return match found.len() <= most || found.is_dir() {
+            true => std::fs::read(path).map_err(disk),
+            false => Err(too_large(most, "this machine has")),
+        };
+    }
+    let mut bytes = Vec::new();
+    let file = std::fs::File::open(path).map_err(disk)?;
+    file.take(MOST_OF_NO_FILE + 1).read_to_end(&mut bytes).map_err(disk)?;
+    match bytes.len() as u64 > MOST_OF_NO_FILE {
+        true => Err(too_large(MOST_OF_NO_FILE, "read from a pipe or a device are")),
+        false => Ok(bytes),
+    }
 }
 
 /// A file that can be read at any place.
@@ -61,10 +94,7 @@ impl<'a> Source<'a> {
     pub fn bytes(&self) -> Result<Cow<'a, [u8]>, FileError> {
         match self.bytes {
             Some(bytes) => Ok(Cow::Borrowed(bytes)),
-            None => match std::fs::read(self.path) {
-                Ok(bytes) => Ok(Cow::Owned(bytes)),
-                Err(source) => Err(FileError::disk("read", self.path, source)),
-            },
+            None => read_bytes(self.path).map(Cow::Owned),
         }
     }
 

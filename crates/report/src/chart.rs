@@ -148,6 +148,18 @@ pub struct Panel {
     pub failed: bool,
 }
 
+/// Numbers farther from 0 than this are drawn here: ticks have to be found between them.
+const FARTHEST: f64 = 1e100;
+
+/// A range that an axis can have: its ends are finite, and far enough apart that numbers lie between them.
+fn sound((low, high): (f64, f64)) -> (f64, f64) {
+    let near = |end: f64| if end.is_nan() { 0.0 } else { end.clamp(-FARTHEST, FARTHEST) };
+    let (low, high) = (near(low), near(high));
+    let least = (1e-9 * low.abs().max(high.abs())).max(1.0 / FARTHEST);
+    let middle = f64::midpoint(low, high);
+    if high - low >= least { (low, high) } else { (middle - least, middle + least) }
+}
+
 impl Panel {
     /// A panel whose axes span all that is drawn.
     pub fn spanning(title: impl Into<String>, series: Vec<Series>) -> Self {
@@ -294,6 +306,7 @@ impl Chart {
     }
 
     fn draw_panel(&self, panel: &Panel, area: &Area<'_>, first: bool, last: bool) -> Drawn {
+        let (x, y) = (sound(panel.x), sound(panel.y));
         let (small, tiny) = (self.columns > 2, self.columns > 6);
         let ink = Tone::Ink.colour();
         let size = if small { 0.86 * TEXT } else { TEXT };
@@ -312,8 +325,8 @@ impl Chart {
         if !panel.title.is_empty() && !tiny {
             builder.caption(&panel.title, (FONT, size).into_font().color(&ink));
         }
-        let mut chart = builder.build_cartesian_2d(panel.x.0..panel.x.1, panel.y.0..panel.y.1)?;
-        let (x_span, y_span) = (panel.x.1 - panel.x.0, panel.y.1 - panel.y.0);
+        let mut chart = builder.build_cartesian_2d(x.0..x.1, y.0..y.1)?;
+        let (x_span, y_span) = (x.1 - x.0, y.1 - y.0);
         let format_x = move |value: &f64| shown(*value, x_span);
         let format_y = move |value: &f64| shown(*value, y_span);
         let mut mesh = chart.configure_mesh();
@@ -335,7 +348,7 @@ impl Chart {
             mesh.y_desc(&self.y_label).axis_desc_style((FONT, TEXT).into_font().color(&ink));
         }
         mesh.draw()?;
-        let inside = |(x, y): (f64, f64)| (x.clamp(panel.x.0, panel.x.1), y.clamp(panel.y.0, panel.y.1));
+        let inside = |at: (f64, f64)| (at.0.clamp(x.0, x.1), at.1.clamp(y.0, y.1));
         for series in &panel.series {
             let points = || series.points.iter().filter(|(x, y)| x.is_finite() && y.is_finite()).map(|&at| inside(at));
             let colour = series.tone.colour();
@@ -361,7 +374,7 @@ impl Chart {
             }
         }
         if panel.failed {
-            let ((left, right), (low, high)) = (panel.x, panel.y);
+            let ((left, right), (low, high)) = (x, y);
             for (from, to) in [(low, high), (high, low)] {
                 let cross = [(left, from), (right, to)];
                 chart.draw_series([PathElement::new(cross, Tone::Failed.colour().stroke_width(4))])?;
@@ -455,6 +468,20 @@ mod tests {
         let csv = chart().csv();
         assert!(csv.starts_with("panel,series,x,y\n\"a, b\",output,0.0,0.0\n"), "{csv}");
         assert_eq!(csv.lines().count(), 1 + 2 * 53);
+    }
+
+    #[test]
+    fn axes_that_no_number_lies_on_are_drawn_all_the_same() {
+        let ends = [1e308, -1e308, 5e-324, 0.0, 1e17, f64::MAX, f64::INFINITY, f64::NAN];
+        for (low, high) in ends.into_iter().flat_map(|low| ends.map(|high| (low, high))) {
+            let points = vec![(low, high), (high, low), (0.0, 1.0)];
+            let mut chart = chart();
+            chart.panels[0] = Panel::spanning("ends", vec![Series::line("y", Tone::Ours, points)]);
+            let svg = chart.svg("ends");
+            assert!(svg.trim_end().ends_with("</svg>") && !svg.contains("NaN"), "{low} {high}");
+            let (low, high) = sound((low, high));
+            assert!(low < high && (high - low).is_finite() && f64::midpoint(low, high) > low);
+        }
     }
 
     #[test]

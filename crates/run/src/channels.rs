@@ -1,8 +1,18 @@
 //! Channels of new data beside those that a network learned: names decide, not positions.
 
+use std::borrow::Cow;
+use std::collections::HashSet;
+use std::collections::hash_map::{Entry, HashMap};
+
 use scrnn::dataset::{Dataset, Sequence};
 
 use crate::failure::{Failure, Result};
+
+/// Most names that a message lists: a file may have thousands.
+const NAMED: usize = 20;
+
+/// Most characters of a name that a message shows.
+const SHOWN: usize = 60;
 
 /// Brings `data`, which come from `place`, to the channels that were learned, in their order.
 ///
@@ -35,6 +45,14 @@ pub fn matched(data: Dataset, learned: &[String], place: &str) -> Result<Dataset
     Ok(Dataset::new(learned.to_vec(), sequences.collect::<scrnn::error::Result<_>>()?)?)
 }
 
+/// The beginning of a text from a file, which may be long, as a message shows it.
+pub fn shown(text: &str) -> Cow<'_, str> {
+    match text.char_indices().nth(SHOWN) {
+        Some((end, _)) => format!("{}...", &text[..end]).into(),
+        None => text.into(),
+    }
+}
+
 /// Whether the channels have no names of their own.
 pub fn nameless(channels: &[String]) -> bool {
     channels == Dataset::numbered_channels(channels.len())
@@ -47,13 +65,22 @@ fn renamed(data: &Dataset, names: &[String]) -> Result<Dataset> {
 
 /// For each channel that was learned, where it stands among those that were found; or what is wrong with them.
 pub fn by_name<S: AsRef<str>>(found: &[S], learned: &[String]) -> std::result::Result<Vec<usize>, String> {
-    let quoted = |names: &[&str]| names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+    let quoted = |names: &[&str]| {
+        let list = names.iter().take(NAMED).map(|name| format!("`{}`", shown(name))).collect::<Vec<_>>().join(", ");
+        if names.len() > NAMED { format!("{list} and {} more", names.len() - NAMED) } else { list }
+    };
     let names: Vec<&str> = found.iter().map(AsRef::as_ref).collect();
-    let mut doubled: Vec<&str> =
-        (0..names.len()).filter(|&k| names[..k].contains(&names[k])).map(|k| names[k]).collect();
+    let (mut places, mut doubled) = (HashMap::new(), Vec::new());
+    for (place, &name) in names.iter().enumerate() {
+        match places.entry(name) {
+            Entry::Vacant(entry) => _ = entry.insert(place),
+            Entry::Occupied(_) => doubled.push(name),
+        }
+    }
     doubled.dedup();
-    let missing: Vec<&str> = learned.iter().map(String::as_str).filter(|name| !names.contains(name)).collect();
-    let unknown: Vec<&str> = names.iter().copied().filter(|name| !learned.iter().any(|one| one == name)).collect();
+    let needed: HashSet<&str> = learned.iter().map(String::as_str).collect();
+    let missing: Vec<&str> = learned.iter().map(String::as_str).filter(|name| !places.contains_key(name)).collect();
+    let unknown: Vec<&str> = names.iter().copied().filter(|name| !needed.contains(name)).collect();
     let mut wrong = Vec::new();
     if !missing.is_empty() {
         wrong.push(format!("has no channel {}", quoted(&missing)));
@@ -67,8 +94,7 @@ pub fn by_name<S: AsRef<str>>(found: &[S], learned: &[String]) -> std::result::R
     if !wrong.is_empty() {
         return Err(wrong.join(", and "));
     }
-    let place = |name: &String| names.iter().position(|other| other == name).unwrap_or_default();
-    Ok(learned.iter().map(place).collect())
+    Ok(learned.iter().map(|name| places.get(name.as_str()).copied().unwrap_or_default()).collect())
 }
 
 /// What to do about channels that do not match.

@@ -30,9 +30,15 @@ pub struct Row {
 }
 
 /// The rows of a history file, up to the first that is not whole.
+///
+/// # Errors
+/// [`Failure::Disk`].
 pub fn read(path: &Path) -> Result<Vec<Row>> {
-    let bytes = std::fs::read(path).map_err(|error| Failure::disk("read", path, error))?;
-    let text = String::from_utf8_lossy(&bytes);
+    Ok(rows(&read_bytes(path)?))
+}
+
+/// The rows of a history file's bytes, up to the first that is not whole.
+pub fn rows(bytes: &[u8]) -> Vec<Row> {
     let row = |line: &str| {
         let mut fields = line.split(',');
         let epoch = fields.next()?.parse().ok()?;
@@ -42,8 +48,64 @@ pub fn read(path: &Path) -> Result<Vec<Row>> {
         let recoveries = fields.nth(4).map_or(Some(0), |field| field.parse().ok())?;
         Some(Row { epoch, nll: nll.parse().ok(), mse, recoveries })
     };
-    let (kept, _, _) = rows_up_to(&text, u64::MAX);
-    Ok(kept.lines().map_while(row).collect())
+    cut(bytes, u64::MAX).kept.lines().map_while(row).collect()
+}
+
+/// What of a history stays when a run goes on.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Cut {
+    /// The whole rows, without the header.
+    pub kept: String,
+    /// Epoch and seconds of the last of them.
+    pub last: Option<(u64, f64)>,
+    /// Number of the line that ended them by being no row, unless that is a last one that was half written.
+    pub damaged: Option<usize>,
+}
+
+/// The rows of a history's bytes up to `epoch`. Epochs ascend; what does not is no row.
+pub fn cut(bytes: &[u8], epoch: u64) -> Cut {
+    // A byte that is no text spoils its line, not what stands before it.
+    let text = String::from_utf8_lossy(bytes);
+    let mut found = Cut::default();
+    let mut lines = text.split_inclusive('\n').enumerate().skip(1);
+    while let Some((number, line)) = lines.next() {
+        let whole = line.ends_with('\n');
+        match row_of(line) {
+            Some((row, seconds)) if whole && row <= epoch && found.last.is_none_or(|(last, _)| row > last) => {
+                found.kept.push_str(line);
+                found.last = Some((row, seconds));
+            }
+            // Ahead of the checkpoint, as all that follow; if not, this one is damaged.
+            Some((row, _)) if row > epoch => {
+                let back = lines.any(|(_, line)| row_of(line).is_some_and(|(row, _)| row <= epoch));
+                found.damaged = back.then_some(number + 1);
+                break;
+            }
+            _ => {
+                found.damaged = whole.then_some(number + 1);
+                break;
+            }
+        }
+    }
+    found
+}
+
+/// Epoch and seconds of a row. A field may be empty where a network has no nll.
+fn row_of(line: &str) -> Option<(u64, f64)> {
+    let fields: Vec<&str> = line.trim_end_matches(['\r', '\n']).split(',').take(9).collect();
+    let numbers =
+        fields.iter().enumerate().all(|(k, field)| k == 1 && field.is_empty() || field.parse::<f64>().is_ok());
+    // Files from before trainings were reset lack the last column.
+    if !numbers || !(7..=8).contains(&fields.len()) || fields.get(7).is_some_and(|field| field.parse::<u64>().is_err())
+    {
+        return None;
+    }
+    let seconds = fields[6].parse().ok().filter(|seconds: &f64| seconds.is_finite() && *seconds >= 0.0)?;
+    Some((fields[0].parse().ok()?, seconds))
+}
+
+fn read_bytes(path: &Path) -> Result<Vec<u8>> {
+    scrnn_data::read_bytes(path).map_err(Failure::from)
 }
 
 /// The history that is being written.
@@ -66,13 +128,11 @@ impl History {
     /// Damage before that is said: the rows from there on are lost, the training is not.
     pub fn go_on(run: &RunFolder, epoch: u64, messages: &dyn Messages) -> Result<Self> {
         let path = run.file(HISTORY);
-        // A byte that is no text spoils its line, not what stands before it.
-        let text = match std::fs::read(&path) {
-            Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
-            Err(error) => return Err(Failure::disk("read", &path, error)),
+        let bytes = match path.exists() {
+            true => read_bytes(&path)?,
+            false => Vec::new(),
         };
-        let (kept, last, damaged) = rows_up_to(&text, epoch);
+        let Cut { kept, last, damaged } = cut(&bytes, epoch);
         if let Some(line) = damaged {
             messages.say(&format!(
                 "{}: line {line} is damaged; the history is cut before it and goes on from epoch {epoch}",
@@ -122,30 +182,6 @@ impl History {
     }
 }
 
-/// The whole rows up to `epoch`, epoch and seconds of the last of them, and the number of the line that ended them by being no
-/// row, unless that is a last one that was half written.
-fn rows_up_to(text: &str, epoch: u64) -> (String, Option<(u64, f64)>, Option<usize>) {
-    let (mut kept, mut last, mut damaged) = (String::new(), None, None);
-    for (number, line) in text.split_inclusive('\n').enumerate().skip(1) {
-        let mut fields = line.trim_end().split(',');
-        let row = fields.next().and_then(|field| field.parse::<u64>().ok());
-        let seconds = fields.nth(5).and_then(|field| field.parse::<f64>().ok());
-        let whole = line.trim_end().split(',').all(|field| field.is_empty() || field.parse::<f64>().is_ok());
-        match (row.filter(|_| whole), seconds) {
-            (Some(row), Some(seconds)) if row <= epoch && line.ends_with('\n') => {
-                kept.push_str(line);
-                last = Some((row, seconds));
-            }
-            (Some(row), Some(_)) if row > epoch => break,
-            _ => {
-                damaged = line.ends_with('\n').then_some(number + 1);
-                break;
-            }
-        }
-    }
-    (kept, last, damaged)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -173,14 +209,38 @@ mod tests {
     #[test]
     fn rows_beyond_the_checkpoint_and_half_lines_are_cut_off() {
         let row = |epoch| format!("{epoch},0.5,0.1,1e-7,1e-4,2.0,{epoch}.250\n");
-        let text = format!("{HEADER}{}{}{}", row(0), row(10), row(20));
-        assert_eq!(rows_up_to(&text, 10), (format!("{}{}", row(0), row(10)), Some((10, 10.25)), None));
-        let half = &text[..text.len() - 3];
-        assert_eq!(rows_up_to(half, 100).1, Some((10, 10.25)));
-        assert_eq!(rows_up_to("", 100), (String::new(), None, None));
-        let bad = text.replace("10,0.5", "10,0\u{fffd}5");
-        assert_eq!(rows_up_to(&bad, 100), (row(0), Some((0, 0.25)), Some(3)));
-        let bad = text.replace("\n10,", "\n1\u{fffd},");
-        assert_eq!(rows_up_to(&bad, 100), (row(0), Some((0, 0.25)), Some(3)));
+        let rows = |epochs: &[u64]| epochs.iter().map(|&epoch| row(epoch)).collect::<String>();
+        let found = |text: &str, epoch| cut(text.as_bytes(), epoch);
+        let of = |epochs: &[u64], damaged| {
+            let last = epochs.last().map(|&epoch| (epoch, epoch as f64 + 0.25));
+            Cut { kept: rows(epochs), last, damaged }
+        };
+        let text = format!("{HEADER}{}", rows(&[0, 10, 20]));
+        assert_eq!(found(&text, 10), of(&[0, 10], None));
+        assert_eq!(found(&text[..text.len() - 3], 100), of(&[0, 10], None));
+        assert_eq!(found("", 100), Cut::default());
+        for (from, to) in [
+            ("10,0.5", "10,0\u{fffd}5"),
+            ("\n10,", "\n1\u{fffd},"),
+            ("10.250", "inf"),
+            ("10.250", "NaN"),
+            ("10.250", "-1.0"),
+            ("10.250", "10.250,0.5"),
+            ("10.250", "10.250,1,1"),
+            (",10.250", ""),
+            ("10,0.5,0.1", "10,0.5,"),
+            ("\n10,", "\n-10,"),
+            // A row again, one that goes back, one that jumps ahead though others follow.
+            ("\n10,", "\n0,"),
+            ("\n10,", "\n99,"),
+        ] {
+            let bad = text.replacen(from, to, 1);
+            assert_ne!(bad, text);
+            assert_eq!(found(&bad, 30), of(&[0], Some(3)), "{from} -> {to}");
+        }
+        let mut bytes = text.clone().into_bytes();
+        let at = text.find("\n10,").unwrap() + 1;
+        bytes[at] = 0xff;
+        assert_eq!(cut(&bytes, 100), of(&[0], Some(3)));
     }
 }

@@ -9,7 +9,9 @@
 //! | [`training`] | one training, from a resolved experiment to a run folder: begun, gone on with, or begun anew |
 //! | [`verdict`] | the result of a training, in words and as JSON |
 //! | [`run_folder`], [`history`], [`notes`] | what a training leaves behind |
+//! | [`resume`] | whether a run may go on |
 //! | [`trained`], [`channels`] | a trained network as it is found again, and new data brought to its channels by name |
+//! | [`stream`] | samples that come line by line while they are made |
 //! | [`assessment`], [`truth`], [`channel_scores`] | how well it predicts, beside simple models and what is known of the noise |
 //! | [`familiar`] | new data beside the range of what was learned |
 //! | [`conversion`] | data from one kind of file to another |
@@ -36,12 +38,13 @@ pub mod messages;
 pub mod notes;
 pub mod recipe;
 pub mod request;
+pub mod resume;
 pub mod run_folder;
 pub mod source;
+pub mod stream;
 pub mod trained;
 pub mod training;
 pub mod truth;
 pub mod verdict;
 
 mod recorder;
-mod resume;

@@ -15,7 +15,7 @@ pub fn check(what: &str, bytes: Option<u128>) -> Result<()> {
 
 /// What stands against so many bytes, if anything does.
 pub fn complaint(bytes: Option<u128>) -> Option<String> {
-    complaint_of(bytes, machine())
+    complaint_of(bytes, scrnn_data::memory::of_machine().map(u128::from))
 }
 
 fn complaint_of(bytes: Option<u128>, machine: Option<u128>) -> Option<String> {
@@ -31,19 +31,6 @@ fn complaint_of(bytes: Option<u128>, machine: Option<u128>) -> Option<String> {
 /// The product, if it is one.
 pub fn product(factors: &[usize]) -> Option<u128> {
     factors.iter().try_fold(1_u128, |product, &factor| product.checked_mul(factor as u128))
-}
-
-/// Bytes that this process may use: the machine's, or its container's. Unknown where there is no /proc.
-fn machine() -> Option<u128> {
-    let total = std::fs::read_to_string("/proc/meminfo").ok().and_then(|text| total_in(&text));
-    let limits = ["/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"];
-    let limits = limits.iter().filter_map(|path| std::fs::read_to_string(path).ok()?.trim().parse::<u128>().ok());
-    limits.chain(total).filter(|bytes| *bytes > 0).min()
-}
-
-fn total_in(meminfo: &str) -> Option<u128> {
-    let line = meminfo.lines().find_map(|line| line.strip_prefix("MemTotal:"))?;
-    line.trim().strip_suffix("kB")?.trim().parse::<u128>().ok().map(|kilobytes| kilobytes * 1024)
 }
 
 fn amount(bytes: u128) -> String {
@@ -65,6 +52,5 @@ mod tests {
         assert_eq!(complaint_of(Some(34_000_000_000), machine).unwrap(), "needs 34.0 GB; this machine has 24.0 GB");
         assert!(complaint_of(product(&[usize::MAX; 3]), machine).unwrap().starts_with("needs more than"));
         assert!(complaint_of(product(&[usize::MAX; 2]), None).is_some() && complaint_of(Some(1 << 40), None).is_none());
-        assert_eq!(total_in("MemTotal:       1000 kB\nMemFree: 1 kB\n"), Some(1_024_000));
     }
 }

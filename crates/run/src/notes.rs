@@ -58,6 +58,15 @@ impl Notes {
         serde_json::from_value(checkpoint.notes.clone()).ok()
     }
 
+    /// The experiment, checked as one from a file is: a checkpoint may come from anywhere.
+    ///
+    /// # Errors
+    /// What is wrong with it, in words.
+    pub fn experiment(&self) -> Result<Experiment, String> {
+        let experiment = Experiment::deserialize(&self.experiment).map_err(|error| error.to_string())?;
+        experiment.check().map(|()| experiment)
+    }
+
     /// As a checkpoint holds them.
     pub fn to_value(&self) -> Value {
         serde_json::to_value(self).expect("strings and finite numbers become JSON")

@@ -8,6 +8,9 @@ use crate::experiment::{Difference, Experiment, OptimiserName, differences};
 use crate::failure::{Failure, Result};
 use crate::notes::Notes;
 
+/// Most lengths of sequences that a message lists.
+const MOST_LENGTHS: usize = 20;
+
 /// Compares what the checkpoint notes with `now`, and returns `now` with the best score so far.
 ///
 /// # Errors
@@ -18,6 +21,11 @@ pub fn check(checkpoint: &Checkpoint, now: Notes, experiment: &Experiment, path:
     let Some(then) = Notes::of(checkpoint) else {
         return Err(Failure::refused(format!("the checkpoint in {folder} was not written by `scrnn train`"), anew));
     };
+    // What is compared key by key is an experiment: anything else may have keys without end.
+    if let Err(error) = then.experiment() {
+        let message = format!("the experiment that the checkpoint in {folder} notes cannot be read: {error}");
+        return Err(Failure::refused(message, anew));
+    }
     let mut changes = differences(&then.experiment, &now.experiment);
     // Samples are compared, not where they lie.
     changes.retain(|change| change.key != "data.files");
@@ -45,7 +53,13 @@ pub fn check(checkpoint: &Checkpoint, now: Notes, experiment: &Experiment, path:
     if (&then.data.digest, &then.data.lengths) != (&now.data.digest, &now.data.lengths) {
         let mut message = format!("the data changed since the run in {folder} began:");
         if then.data.lengths != now.data.lengths {
-            message += &format!("\n  samples in each sequence: {:?} -> {:?}", then.data.lengths, now.data.lengths);
+            let list = |lengths: &[usize]| {
+                let shown = lengths.iter().take(MOST_LENGTHS).map(ToString::to_string).collect::<Vec<_>>().join(", ");
+                let more = lengths.len().saturating_sub(MOST_LENGTHS);
+                if more > 0 { format!("{shown} and {more} more") } else { shown }
+            };
+            let (old, new) = (list(&then.data.lengths), list(&now.data.lengths));
+            message += &format!("\n  samples in each sequence: {old} -> {new}");
         }
         let short = |digest: &str| digest.chars().take(12).collect::<String>();
         message += &format!("\n  digest: {} -> {}", short(&then.data.digest), short(&now.data.digest));

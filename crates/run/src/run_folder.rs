@@ -17,6 +17,9 @@ pub const HISTORY: &str = "history.csv";
 /// Held while a process trains here.
 const LOCK: &str = "lock";
 
+/// All that a training keeps there.
+pub const FILES: [&str; 5] = [EXPERIMENT, CHECKPOINT, BEST, HISTORY, LOCK];
+
 /// A run folder that this process owns.
 #[derive(Debug)]
 pub struct RunFolder {
@@ -32,6 +35,13 @@ impl RunFolder {
     /// [`Failure::Refused`] while another process trains there, [`Failure::Disk`].
     pub fn open(path: &Path) -> Result<Self> {
         fs::create_dir_all(path).map_err(|error| Failure::disk("make the folder", path, error))?;
+        for file in FILES.map(|name| path.join(name)) {
+            // Opening a pipe would wait for somebody at its other end.
+            if fs::metadata(&file).is_ok_and(|found| !found.is_file()) {
+                let message = format!("{} is no file, and a training would write there", file.display());
+                return Err(Failure::refused(message, "move it away, or choose another folder with --out"));
+            }
+        }
         let lock_path = path.join(LOCK);
         let lock = File::options().create(true).truncate(false).write(true).open(&lock_path);
         let lock = lock.map_err(|error| Failure::disk("open", &lock_path, error))?;
@@ -88,6 +98,16 @@ mod tests {
         assert_eq!(failure.code(), 5);
         drop(first);
         RunFolder::open(folder.path()).unwrap();
+    }
+
+    #[test]
+    fn what_is_no_file_in_a_place_of_one_is_refused() {
+        for name in FILES {
+            let folder = tempfile::tempdir().unwrap();
+            fs::create_dir(folder.path().join(name)).unwrap();
+            let failure = RunFolder::open(folder.path()).unwrap_err();
+            assert!(failure.code() == 5 && failure.to_string().contains(name), "{failure}");
+        }
     }
 
     #[test]

@@ -5,10 +5,8 @@ use std::path::{Path, PathBuf};
 use scrnn::checkpoint::Checkpoint;
 use scrnn::dataset::Dataset;
 use scrnn::network::Network;
-use serde::Deserialize;
 
 use crate::channels;
-use crate::experiment::Experiment;
 use crate::failure::{Failure, Result};
 use crate::familiar;
 use crate::messages::Messages;
@@ -85,8 +83,7 @@ impl Trained {
 
     /// Which part of its files it learned, where that is known.
     pub fn selection(&self) -> Option<Selection> {
-        let experiment = Experiment::deserialize(&self.notes.as_ref()?.experiment).ok()?;
-        Some(experiment.data.selection())
+        Some(self.notes.as_ref()?.experiment().ok()?.data.selection())
     }
 
     /// The sequences that it learned, made (by simulated robots: on so many threads) or read again.
@@ -95,7 +92,7 @@ impl Trained {
         let notes = self.notes.as_ref().ok_or_else(|| {
             Failure::input(format!("{} does not say what it was trained on", self.path.display()), other)
         })?;
-        let experiment = Experiment::deserialize(&notes.experiment).map_err(|error| {
+        let experiment = notes.experiment().map_err(|error| {
             Failure::input(format!("the experiment in {} cannot be read: {error}", self.path.display()), other)
         })?;
         let data = source::load(&experiment.data, threads)?.data;
@@ -146,7 +143,7 @@ impl Trained {
 
 /// Reads a checkpoint file.
 pub fn read_checkpoint(path: &Path) -> Result<Checkpoint> {
-    let bytes = std::fs::read(path).map_err(|error| Failure::disk("read", path, error))?;
+    let bytes = scrnn_data::read_bytes(path)?;
     Checkpoint::from_bytes(&bytes).map_err(|error| {
         let message = format!("{} is not a checkpoint that this version reads: {error}", path.display());
         Failure::input(message, "give a run folder, or a .safetensors file that `scrnn train` wrote")

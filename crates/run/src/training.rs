@@ -19,7 +19,7 @@ use crate::messages::{Messages, Progress};
 use crate::notes::{DataNotes, Notes, Score, learned_part};
 use crate::recorder::{Record, Recorder};
 use crate::resume;
-use crate::run_folder::{BEST, CHECKPOINT, EXPERIMENT, HISTORY, RunFolder};
+use crate::run_folder::{BEST, CHECKPOINT, EXPERIMENT, FILES, HISTORY, RunFolder};
 use crate::source::{self, Source};
 use crate::trained::read_checkpoint;
 
@@ -111,6 +111,7 @@ pub fn train_on(
         best: None,
     };
 
+    refuse_own_input(experiment, path)?;
     let run = RunFolder::open(path)?;
     let found = run.file(CHECKPOINT).exists();
     if found && wanted == Found::Refuse {
@@ -152,6 +153,19 @@ pub fn train_on(
     let (score, best, seconds) = (recorder.score_of(learner.epoch()), recorder.best(), recorder.seconds());
     let run = run.path().display().to_string();
     Ok(Training { run, outcome, learner, source, scaling, score, best, seconds })
+}
+
+/// Refuses to write a run's files over the data that it learns.
+fn refuse_own_input(experiment: &Experiment, run: &Path) -> Result<()> {
+    let inputs =
+        experiment.data.files.iter().flatten().flat_map(|pattern| scrnn_data::expand(pattern).unwrap_or_default());
+    for input in inputs {
+        if let Some(name) = FILES.iter().find(|name| scrnn_data::is_one_file(&run.join(name), &input)) {
+            let message = format!("the run would write its {name} over the data: {}", input.display());
+            return Err(Failure::refused(message, "choose another folder with --out"));
+        }
+    }
+    Ok(())
 }
 
 /// Says what is learned, and what looks wrong in it, before anything is learned.

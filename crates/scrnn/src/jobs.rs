@@ -67,7 +67,9 @@ pub fn side_by_side<T: Send, E: Send>(
         done
     };
     let mut all: Vec<(usize, Result<T, E>)> = thread::scope(|scope| {
-        let others: Vec<_> = (1..cores.min(count)).map(|_| scope.spawn(worker)).collect();
+        // A thread that the system refuses is one that does not help: the others do its part.
+        let helper = |_| thread::Builder::new().spawn_scoped(scope, worker).ok();
+        let others: Vec<_> = (1..cores.min(count)).filter_map(helper).collect();
         let mut all = worker();
         for other in others {
             all.extend(other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));

@@ -36,13 +36,13 @@ pub struct Arguments {
     /// Which sequences
     #[arg(value_parser = args::task_names())]
     task: TaskName,
-    /// Seed of the noise
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    /// Seed of the noise, 0 to 18446744073709551615
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = args::seed())]
     seed: u64,
-    /// Number of sequences [default: as in the thesis]
+    /// Number of sequences, 1 to 1000000 [default: as in the thesis]
     #[arg(long, value_name = "N", value_parser = args::count(1, 1_000_000))]
     sequences: Option<usize>,
-    /// Samples in each sequence [default: as in the thesis, 1000; 180 for reach, 470 for interact]
+    /// Samples in each sequence, 1 to 1000000000 [default: as in the thesis, 1000; 180 for reach, 470 for interact]
     #[arg(long, value_name = "N", value_parser = args::count(1, 1_000_000_000))]
     steps: Option<usize>,
     /// With reach: put the object exactly at its three positions, instead of up to 10 mm off

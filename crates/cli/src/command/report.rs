@@ -31,8 +31,8 @@ pub struct Arguments {
     /// Where to write [default: the run folder]
     #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Seed of the closed loop's noise
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    /// Seed of the closed loop's noise, 0 to 18446744073709551615
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = crate::args::seed())]
     seed: u64,
 }
 

@@ -8,7 +8,7 @@ use scrnn_reproduce::{self as reproduce, Context, Experiment, Options, STUDIES};
 use scrnn_run::experiment::Override;
 use scrnn_run::failure::{Ending, Result};
 
-use crate::args::Shared;
+use crate::args::{MOST_IN_TOML, Shared, whole};
 use crate::output;
 use crate::progress::Bars;
 use crate::signals::Signals;
@@ -33,18 +33,18 @@ pub struct Arguments {
     /// Which settings
     #[arg(long, value_enum, default_value_t = Preset::Fast)]
     preset: Preset,
-    /// Number of seeds, each with data and initial weights of its own; of `interact` the number of networks a condition,
+    /// Number of seeds, 1 to 1000, each with data and initial weights of its own; of `interact` the number of networks a condition,
     /// which all learn the same recordings
     #[arg(long, visible_alias = "networks", value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
-    /// The first seed
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    /// The first seed, 0 to 9000000000000000000
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(0, 9_000_000_000_000_000_000))]
     seed: u64,
     /// The folder [default: runs/reproduce/EXPERIMENT-PRESET]
     #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Number of epochs, instead of the preset's
-    #[arg(long, value_name = "N")]
+    /// Number of epochs, 0 to 9223372036854775807, instead of the preset's
+    #[arg(long, value_name = "N", value_parser = whole(0, MOST_IN_TOML))]
     epochs: Option<u64>,
     /// A key of the S-CTRNN's training or network, e.g. --set training.adam.rate=1e-3
     #[arg(long, value_name = "KEY=VALUE")]

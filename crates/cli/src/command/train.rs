@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use scrnn::learning::Outcome;
 
-use crate::args::{Part, Shared};
+use crate::args::{MOST_IN_TOML, Part, Shared, whole};
 use crate::output;
 use crate::progress::Bars;
 use crate::signals::Signals;
@@ -46,11 +46,11 @@ pub struct Arguments {
     /// Throw away the run that is in the run folder
     #[arg(long, conflicts_with = "resume")]
     overwrite: bool,
-    /// Number of epochs; 0 writes the initial network. Short for --set training.epochs=N
-    #[arg(long, value_name = "N")]
+    /// Number of epochs, 0 to 9223372036854775807; 0 writes the initial network. Short for --set training.epochs=N
+    #[arg(long, value_name = "N", value_parser = whole(0, MOST_IN_TOML))]
     epochs: Option<u64>,
-    /// Seed of the initial weights. Short for --set seed=N
-    #[arg(long, value_name = "N")]
+    /// Seed of the initial weights, 0 to 9223372036854775807. Short for --set seed=N
+    #[arg(long, value_name = "N", value_parser = whole(0, MOST_IN_TOML))]
     seed: Option<u64>,
     /// Data to learn instead of those that the experiment names
     #[arg(long, value_name = "FILE,...", value_delimiter = ',')]

@@ -100,15 +100,15 @@ pub fn undo<'a>(
                 }
             }
             Filter::Deflate => {
-                file.budget.take(size)?;
+                file.budget.unpack(size)?;
                 Cow::Owned(Packing::Zlib.unpack(&data, size).ok_or_else(broken)?.into_owned())
             }
             Filter::Lzf => {
-                file.budget.take(size)?;
+                file.budget.unpack(size)?;
                 Cow::Owned(lzf(&data, size).ok_or_else(broken)?)
             }
             Filter::Shuffle(element) => {
-                file.budget.take(data.len())?;
+                file.budget.unpack(data.len())?;
                 Cow::Owned(unshuffled(&data, *element))
             }
         };

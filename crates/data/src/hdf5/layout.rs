@@ -354,15 +354,17 @@ fn array(file: &File<'_>, contents: &Contents, found: &Found, selection: &Select
         Track { name: (n + 1).to_string(), values: values.map(|index| numbers[index]).collect(), times: Vec::new() }
     });
     let tracks = tracks.collect();
-    Ok(Samples { channels: names(&found.path, axes.channels.map(|_| channels)), tracks, ..Samples::default() })
+    let channels = names(file, &found.path, axes.channels.map(|_| channels))?;
+    Ok(Samples { channels, tracks, ..Samples::default() })
 }
 
 /// The channels of a data set: its path, and their numbers if it has an axis of several.
-fn names(path: &str, channels: Option<usize>) -> Vec<String> {
-    match channels {
+fn names(file: &File<'_>, path: &str, channels: Option<usize>) -> Result<Vec<String>, FormatProblem> {
+    file.budget.take(channels.unwrap_or(1).saturating_mul(path.len() + 48))?;
+    Ok(match channels {
         None | Some(1) => vec![path.to_owned()],
         Some(channels) => (0..channels).map(|channel| format!("{path}.{channel}")).collect(),
-    }
+    })
 }
 
 /// Data sets side by side. Names the channels in `samples`, or holds them to those that are named.
@@ -389,8 +391,7 @@ fn track(
             });
         }
         let width = lengths(found).1;
-        file.budget.take(width.unwrap_or(1).saturating_mul(path.len() + 48))?;
-        channels.extend(names(path, width));
+        channels.extend(names(file, path, width)?);
     }
     if samples.channels.is_empty() {
         samples.channels = channels;

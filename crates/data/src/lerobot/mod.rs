@@ -18,7 +18,7 @@ use crate::parquet::Parquet;
 use crate::problem::FormatProblem;
 use crate::reading::Facts;
 use crate::samples::Samples;
-use crate::source::Source;
+use crate::source::{Source, read_bytes};
 use crate::{FileError, Remark, Selection, natural};
 
 mod episodes;
@@ -82,8 +82,9 @@ fn names(root: &Path, count: usize) -> Option<Vec<String>> {
 
 fn info_of(root: &Path) -> Result<Option<Info>, FileError> {
     let path = root.join(info::PLACE);
-    let text = std::fs::read_to_string(&path).map_err(|source| FileError::disk("read", &path, source))?;
     let name = path.display().to_string();
+    let text = String::from_utf8(read_bytes(&path)?)
+        .map_err(|_| FileError::NotText { path: name.clone(), found: "holds bytes that are not UTF-8" })?;
     Budget::of_file(text.len() as u64)
         .take(text.len().saturating_mul(50))
         .map_err(FormatProblem::from)

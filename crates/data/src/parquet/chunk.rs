@@ -163,7 +163,7 @@ impl Column<'_> {
     }
 
     fn unpack<'b>(&self, packed: &'b [u8], size: usize) -> Result<std::borrow::Cow<'b, [u8]>, FormatProblem> {
-        self.budget.take(size)?;
+        self.budget.unpack(size)?;
         self.packing.unpack(packed, size).ok_or_else(|| damaged("a page does not unpack to what it says"))
     }
 

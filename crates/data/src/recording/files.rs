@@ -270,9 +270,11 @@ impl Metadata {
     fn of(folder: &Path) -> Result<Self, FileError> {
         let path = folder.join(METADATA);
         let file = std::fs::File::open(&path).map_err(|error| FileError::disk("read", &path, error))?;
-        let mut text = String::new();
-        let read = file.take(LARGEST_METADATA).read_to_string(&mut text);
+        let mut bytes = Vec::new();
+        let read = file.take(LARGEST_METADATA).read_to_end(&mut bytes);
         read.map_err(|error| FileError::disk("read", &path, error))?;
+        let text =
+            String::from_utf8(bytes).map_err(|_| wrong(&path, RecordingProblem::Bag("it is not UTF-8".into())))?;
         let (names, packed) = parse(&text).map_err(|why| wrong(&path, RecordingProblem::Bag(why)))?;
         let mut files = Vec::with_capacity(names.len());
         for name in names {

@@ -10,7 +10,7 @@ use scrnn::topology::{Prediction, Topology};
 
 use super::{
     Data, Experiment, MeanUnits, MissingName, OptimiserName, ScalingChoice, ScalingConstants, ScalingName,
-    ScalingRanges, SkipName, TaskName, TimeSourceName, Training, robust,
+    ScalingRanges, SkipName, TaskName, TimeSourceName, Training, checks, robust,
 };
 use crate::failure::{Failure, Result};
 use scrnn_data::{Missing, Selection, TimeSource};
@@ -33,6 +33,14 @@ impl Experiment {
         let a_thousandth = (self.training.epochs / 1000).max(1);
         self.output.history_every.get_or_insert(a_thousandth);
         Ok(self)
+    }
+
+    /// Whether all values are in their ranges.
+    ///
+    /// # Errors
+    /// What is wrong, and what would do.
+    pub fn check(&self) -> std::result::Result<(), String> {
+        checks::check(self).map_err(|complaint| format!("{}; needed: {}", complaint.message, complaint.needed))
     }
 
     /// The network's topology on these data, which are in the network's units: constants of the skip connection and of velocity inputs

@@ -4,6 +4,9 @@ use std::str::FromStr;
 
 use toml::{Table, Value};
 
+/// Most parts of a key: no key of an experiment has as many.
+const DEEPEST: usize = 16;
+
 /// One `--set`, or a shorthand for one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Override {
@@ -100,8 +103,9 @@ impl FromStr for Override {
         let (key, value) =
             text.split_once('=').ok_or_else(|| format!("`{text}` has no `=`; write e.g. training.adam.rate=0.001"))?;
         let path: Vec<String> = key.trim().split('.').map(|part| part.trim().to_owned()).collect();
-        if path.iter().any(String::is_empty) {
-            return Err(format!("`{key}` is not a key; write e.g. training.adam.rate=0.001"));
+        if path.iter().any(String::is_empty) || path.len() > DEEPEST {
+            let shown = crate::channels::shown(key);
+            return Err(format!("`{shown}` is not a key; write e.g. training.adam.rate=0.001"));
         }
         let value = value.trim();
         let value = value.parse::<Value>().unwrap_or_else(|_| Value::String(value.to_owned()));
@@ -134,6 +138,14 @@ mod tests {
         Override::list("--topic", "data.topics", &["/a".into()]).instead_of("topic").apply(&mut table).unwrap();
         Override::number("--period", "data.period", 0.5).apply(&mut table).unwrap();
         assert_eq!(table["data"].to_string(), "{ period = 0.5, topics = [\"/a\"] }");
+    }
+
+    #[test]
+    fn keys_within_keys_without_end_are_no_keys() {
+        for parts in [17, 30_000] {
+            let told = applied(&format!("{}=1", vec!["a"; parts].join("."))).unwrap_err();
+            assert!(told.contains("is not a key") && told.len() < 200, "{told}");
+        }
     }
 
     #[test]

@@ -16,7 +16,7 @@ use crate::failure::{Failure, Result};
 /// # Errors
 /// [`Failure::Disk`]; [`Failure::Input`] with the line of the file, or the option, that is wrong.
 pub fn read(path: &Path, overrides: &[Override]) -> Result<Experiment> {
-    let bytes = std::fs::read(path).map_err(|error| Failure::disk("read", path, error))?;
+    let bytes = scrnn_data::read_bytes(path)?;
     let text = String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
         let line = error.as_bytes()[..at].iter().filter(|byte| **byte == b'\n').count() + 1;

@@ -41,8 +41,8 @@ pub struct Arguments {
     /// What the network is fed with
     #[arg(long, value_enum, default_value_t = Mode::Closed)]
     mode: Mode,
-    /// With --mode mixed: the recorded sample's share of the input, from 0 to 1
-    #[arg(long, value_name = "SHARE", default_value_t = 0.5)]
+    /// With --mode mixed: the recorded sample's share of the input, 0 to 1
+    #[arg(long, value_name = "SHARE", default_value_t = 0.5, value_parser = crate::args::number(0.0, 1.0))]
     mixing: f64,
     /// Channels that are fed with recorded samples whatever the mode, by their names
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
@@ -56,17 +56,17 @@ pub struct Arguments {
     /// Start from the initial states in FILE: each row is one, with a column for each context unit
     #[arg(long, value_name = "FILE")]
     initial_state: Option<PathBuf>,
-    /// Number of steps [default: as many as the data have]
+    /// Number of steps, 1 to 1000000000 [default: as many as the data have]
     #[arg(long, value_name = "N", value_parser = crate::args::count(1, 1_000_000_000))]
     steps: Option<usize>,
     /// No noise: what is fed back, and the sample, is the predicted mean
     #[arg(long)]
     no_noise: bool,
-    /// Number of times that each sequence is generated, with noise of its own
+    /// Number of times that each sequence is generated, 1 to 1000000, with noise of its own
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     samples: u32,
-    /// Seed of the noise
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    /// Seed of the noise, 0 to 18446744073709551615
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = crate::args::seed())]
     seed: u64,
     /// Also give the context units' activations
     #[arg(long)]
@@ -133,9 +133,6 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
 /// How each channel is fed.
 fn feedback(arguments: &Arguments, checkpoint: &Checkpoint) -> Result<Feedback> {
     let (n, noise) = (checkpoint.channels.len(), !arguments.no_noise);
-    if !(0.0..=1.0).contains(&arguments.mixing) {
-        return Err(Failure::input(format!("--mixing is {}", arguments.mixing), "give a share from 0 to 1"));
-    }
     let sensed = match arguments.mode {
         Mode::Open => 1.0,
         Mode::Closed => 0.0,

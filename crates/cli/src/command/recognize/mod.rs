@@ -5,7 +5,6 @@ mod alike;
 mod deadline;
 mod online;
 mod regression;
-mod stream;
 
 pub use deadline::Latency;
 pub use regression::RegressionArguments;
@@ -44,9 +43,9 @@ const NAMED: usize = 3;
 /// of a sliding window climbs the likelihood of the window, and the next samples are predicted anew. DATA `-` reads
 /// lines from the standard input and answers each at once. A line holds a number for each channel, between commas, semicolons,
 /// tabs or spaces, in the network's order or in that of a first line with all the names; or it is a JSON object with the
-/// channels as keys, or with the lists `name` and `position`. A blank line ends a sequence, a last line without its end is
-/// no sample. An empty field, null, a number that is not finite, and one that lies 1e12 times as far out as anything that was
-/// learned are missing: a warning goes to stderr, and the network's own prediction stands in for that value.
+/// channels as keys, or with the lists `name` and `position`; no key twice. A blank line ends a sequence, a last line without
+/// its end is no sample. An empty field, null, a number that is not finite, and one that lies 1e12 times as far out as
+/// anything that was learned are missing: a warning goes to stderr, and the network's own prediction stands in for that value.
 ///
 /// With --json each answer is an object: `sample` (its number, from 1), `mean` and `variance` of the next sample in the data's
 /// units (empty before the network's delay is over), `forecast` (the means of the --ahead samples after it), `ln_likelihood`
@@ -69,20 +68,20 @@ pub struct Arguments {
     data: PathBuf,
     #[command(flatten)]
     part: Part,
-    /// Number of starts for each sequence
+    /// Number of starts for each sequence, 1 to 10000
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     starts: u32,
-    /// Number of updates from each start
+    /// Number of updates from each start, 0 to 1000000
     #[arg(long, value_name = "N", default_value_t = 300, value_parser = clap::value_parser!(u64).range(0..=1_000_000))]
     epochs: u64,
-    /// Recognise from the first N samples, and complete the rest
+    /// Recognise from the first N samples, 1 to 1000000000, and complete the rest
     #[arg(long, value_name = "N", value_parser = crate::args::count(1, 1_000_000_000))]
     observed: Option<usize>,
-    /// Rate of the ascent [default: one that suits most networks]
+    /// Rate of the ascent, more than 0, at most 1e6 [default: one that suits most networks]
     #[arg(long, value_name = "RATE", value_parser = crate::args::positive(1e6))]
     rate: Option<f64>,
-    /// Seed of the random starts
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    /// Seed of the random starts, 0 to 18446744073709551615
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = crate::args::seed())]
     seed: u64,
     /// Use the run's best network instead of its newest
     #[arg(long)]

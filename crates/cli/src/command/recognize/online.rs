@@ -13,7 +13,6 @@ use serde_json::json;
 
 use super::deadline::{Deadline, Latency};
 use super::regression::RegressionArguments;
-use super::stream::{Arrival, Stream};
 use crate::args::{Part, Shared};
 use crate::command::generate::unit_names;
 use crate::output::{self, Reader};
@@ -22,6 +21,7 @@ use scrnn_report::Table;
 use scrnn_run::failure::{Ending, Failure, Result};
 use scrnn_run::familiar::{self, Range, Unfamiliar, is_far};
 use scrnn_run::memory::{self, product};
+use scrnn_run::stream::{Arrival, Stream};
 use scrnn_run::trained::{TOO_FAR, Trained};
 
 /// How to follow.
@@ -31,7 +31,7 @@ pub struct Online {
     /// Follow the samples one by one: regress over a sliding window whenever one arrives, and predict the next
     #[arg(long, conflicts_with_all = ["observed", "completed", "starts", "epochs", "seed"])]
     online: bool,
-    /// Samples to predict beyond the next one
+    /// Samples to predict beyond the next one, 0 to 100000
     #[arg(long, value_name = "N", default_value_t = 10, requires = "online", value_parser = crate::args::count(0, 100_000))]
     ahead: usize,
     /// Channels whose input is the network's own prediction, as those of an arm that it moves
@@ -43,8 +43,9 @@ pub struct Online {
     /// Start from the state of the learned sequence of this name or, counted from 1, number [default: their mean]
     #[arg(long, value_name = "NAME|K", requires = "online")]
     sequence: Option<String>,
-    /// In the JSON object, show window and future at these samples, counted from 1
-    #[arg(long, value_name = "K,...", value_delimiter = ',', requires_all = ["online", "json"])]
+    /// In the JSON object, show window and future at these samples, each 1 to 1000000000
+    #[arg(long, value_name = "K,...", value_delimiter = ',', requires_all = ["online", "json"],
+        value_parser = crate::args::count(1, 1_000_000_000))]
     at: Vec<usize>,
     /// In the lines of a stream, show the whole window, its contexts and the number of updates as well
     #[arg(long, requires_all = ["online", "json"])]

@@ -12,23 +12,23 @@ use scrnn_run::failure::{Failure, Result};
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Error regression")]
 pub struct RegressionArguments {
-    /// Steps in the sliding window [default: 50]
+    /// Steps in the sliding window, 1 to 1000000 [default: 50]
     #[arg(long, value_name = "W", value_parser = crate::args::count(1, 1_000_000))]
     window: Option<usize>,
-    /// Updates of the internal state for each sample [default: 10]
+    /// Updates of the internal state for each sample, 0 to 1000000 [default: 10]
     #[arg(long, value_name = "N", value_parser = crate::args::count(0, 1_000_000))]
     steps: Option<usize>,
     /// How the internal state is moved [default: what is safe for most networks]
     #[arg(long, value_enum)]
     optimiser: Option<Optimiser>,
-    /// Momentum of the ascent [default: 0.9]
-    #[arg(long, value_name = "M")]
+    /// Momentum of the ascent, 0 to 0.9999 [default: 0.9]
+    #[arg(long, value_name = "M", value_parser = crate::args::number(0.0, 0.9999))]
     momentum: Option<f64>,
-    /// Longest gradient; 0 leaves it as it is
-    #[arg(long, value_name = "NORM")]
+    /// Longest gradient, 0 to 1e12; 0 leaves it as it is
+    #[arg(long, value_name = "NORM", value_parser = crate::args::number(0.0, 1e12))]
     max_norm: Option<f64>,
-    /// Milliseconds that each sample may take: updates that do not fit are left out
-    #[arg(long, value_name = "MS")]
+    /// Milliseconds that each sample may take, more than 0, at most 1e9: updates that do not fit are left out
+    #[arg(long, value_name = "MS", value_parser = crate::args::positive(1e9))]
     deadline: Option<f64>,
 }
 

@@ -41,16 +41,16 @@ pub struct Arguments {
     /// The state to start from: `corresponding` to the order, that of another learned order, or `mean`
     #[arg(long, value_name = "STATE", default_value = "mean")]
     initial_state: String,
-    /// Number of interactions, each with another order unless one is given, and other noise
+    /// Number of interactions, 1 to 10000, each with another order unless one is given, and other noise
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     trials: u32,
-    /// Seed of random orders and of the sensors' noise
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    /// Seed of random orders and of the sensors' noise, 0 to 18446744073709551615
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = crate::args::seed())]
     seed: u64,
     /// Regress on prediction errors
     #[arg(long)]
     ers: bool,
-    /// Rate of the ascent [default: one that suits most networks]
+    /// Rate of the ascent, more than 0, at most 1e6 [default: one that suits most networks]
     #[arg(long, value_name = "RATE", value_parser = crate::args::positive(1e6))]
     rate: Option<f64>,
     #[command(flatten)]

@@ -11,14 +11,13 @@ use scrnn_sim::reaching::{CYCLE, POSITIONS};
 use scrnn_sim::reaching_recording::ReachingRecording;
 use scrnn_sim::touching::Cycle;
 use scrnn_sim::world::WorldOptions;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::args::Shared;
 use crate::output;
 use crate::outputs::check_distinct;
 use scrnn_data as files;
 use scrnn_report::Table;
-use scrnn_run::experiment::Experiment;
 use scrnn_run::failure::{Ending, Failure, Result};
 use scrnn_run::trained::Trained;
 
@@ -41,20 +40,20 @@ pub struct Arguments {
     /// Where the sphere lies: position 1, 2 or 3, or a place across in metres, from -0.14 (1) to 0 (3)
     #[arg(long, value_name = "1|2|3|Y", default_value = "1", allow_hyphen_values = true)]
     position: Place,
-    /// Put the sphere elsewhere when this many samples are over; a sample lasts half a second
+    /// Put the sphere elsewhere when this many samples are over, 0 to 1000000000; a sample lasts half a second
     #[arg(long, value_name = "STEP", requires = "to", value_parser = crate::args::count(0, 1_000_000_000))]
     shift_at: Option<usize>,
     /// Where to put it
     #[arg(long, value_name = "1|2|3|Y", requires = "shift_at", allow_hyphen_values = true)]
     to: Option<Place>,
-    /// For how many cycles of 12 samples
+    /// For how many cycles of 12 samples, 1 to 100000
     #[arg(long, value_name = "N", default_value_t = 15, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     cycles: u32,
     /// No noise: the network runs on its predicted means
     #[arg(long)]
     no_noise: bool,
-    /// Seed of the noise
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    /// Seed of the noise, 0 to 18446744073709551615
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = crate::args::seed())]
     seed: u64,
     /// Use the run's best network instead of its newest
     #[arg(long)]
@@ -172,7 +171,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
 }
 
 fn recording(trained: &Trained, arguments: &Arguments) -> Result<ReachingRecording<Cursor<Vec<u8>>>> {
-    let experiment = trained.notes.as_ref().and_then(|notes| Experiment::deserialize(&notes.experiment).ok());
+    let experiment = trained.notes.as_ref().and_then(|notes| notes.experiment().ok());
     let experiment = experiment.and_then(|experiment| toml::to_string(&experiment).ok());
     let (seed, position) = (arguments.seed.to_string(), arguments.position.0.to_string());
     let notes = [("task", "reach"), ("seed", seed.as_str()), ("position", position.as_str())];

@@ -6,6 +6,8 @@ use super::wire::{Fields, Value};
 
 /// Most fields of all messages together.
 const MOST_FIELDS: usize = 1 << 16;
+/// Longest name of a message with all that it stands in, in bytes: each message has one.
+const LONGEST_NAME: usize = 1000;
 /// Messages may be declared this deep in others.
 const DEEPEST: usize = 32;
 
@@ -177,6 +179,9 @@ impl Collecting {
             }
         }
         let full = if within.is_empty() { name } else { format!("{within}.{name}") };
+        if full.len() > LONGEST_NAME {
+            return Err(format!("declares a message whose name has more than {LONGEST_NAME} bytes"));
+        }
         let mut fields = Fields(message);
         while let Some((number, value)) = fields.field()? {
             if let (3, Value::Bytes(nested)) = (number, value) {

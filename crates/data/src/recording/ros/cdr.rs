@@ -17,6 +17,9 @@ use crate::recording::tree::{Array, MOST_NODES, Number, Tree};
 /// A message may be longer than its definition by what padding there can be.
 const MOST_LEFT: usize = 7;
 
+/// Most entries of a list for which room is made before they come.
+const MOST_RESERVED: usize = 64;
+
 /// Reads a message.
 ///
 /// # Errors
@@ -85,8 +88,8 @@ impl<'m> Cursor<'m> {
             let length = count.checked_mul(number.size()).ok_or_else(short)?;
             return Ok(Tree::Array(Array { number, big: self.big, bytes: self.take(length)? }));
         }
-        // What is in it has at least a byte each: no more room than the message has bytes.
-        let mut list = Vec::with_capacity(count.min(self.body.len() - self.at).min(self.left));
+        // Lists may be in lists: what they promise to hold is not reserved.
+        let mut list = Vec::with_capacity(count.min(MOST_RESERVED));
         for _ in 0..count {
             list.push(self.one(definition, part)?);
         }

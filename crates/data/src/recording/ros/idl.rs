@@ -14,6 +14,8 @@ use crate::recording::tree::Number;
 
 /// Most words of a definition: what is longer is no message's.
 const MOST_WORDS: usize = 1 << 20;
+/// Longest name with its modules, in bytes: each type and each field has one.
+const LONGEST_NAME: usize = 1000;
 
 /// Reads all structs of a text.
 ///
@@ -38,15 +40,15 @@ fn words(text: &str) -> Result<Vec<&str>, String> {
         if words.len() == MOST_WORDS {
             return Err(format!("have a definition of more than {MOST_WORDS} words"));
         }
-        let line = rest.find('\n').unwrap_or(rest.len());
+        let after_line = |rest: &'_ str| rest.find('\n').unwrap_or(rest.len());
         let length = if rest.starts_with("//") || first == '#' || rest.starts_with("====") {
-            rest = &rest[line..];
+            rest = &rest[after_line(rest)..];
             continue;
         } else if rest.starts_with("/*") {
             rest = rest.split_once("*/").map_or("", |(_, after)| after);
             continue;
         } else if rest.starts_with("IDL:") {
-            rest = &rest[line..];
+            rest = &rest[after_line(rest)..];
             continue;
         } else if first == '"' {
             words.push("\"");
@@ -133,12 +135,12 @@ impl<'a> Parser<'a> {
                 let (kind, count) = self.kind()?;
                 let name = self.next();
                 let count = self.dimensions(count)?;
-                self.aliases.insert(self.full(name), (kind, count));
+                self.aliases.insert(self.full(name)?, (kind, count));
                 self.need(";")
             }
             "enum" => {
                 let name = self.next();
-                self.aliases.insert(self.full(name), (Kind::Number(Number::Unsigned(4)), Count::One));
+                self.aliases.insert(self.full(name)?, (Kind::Number(Number::Unsigned(4)), Count::One));
                 self.skip_past(";");
                 Ok(())
             }
@@ -153,7 +155,7 @@ impl<'a> Parser<'a> {
 
     fn structure(&mut self) -> Result<(), String> {
         let name = self.next();
-        let name = self.full(name);
+        let name = self.full(name)?;
         self.need("{")?;
         let mut fields = Vec::new();
         loop {
@@ -229,11 +231,11 @@ impl<'a> Parser<'a> {
                 }
                 while self.takes("::") {
                     name = format!("{name}::{}", self.next());
-                    if name.len() > 1000 {
+                    if name.len() > LONGEST_NAME {
                         return Err(odd("a name that does not end"));
                     }
                 }
-                let full = if name.contains("::") { name } else { self.full(&name) };
+                let full = if name.contains("::") { name } else { self.full(&name)? };
                 Ok(self.aliases.get(&full).cloned().unwrap_or_else(|| (Kind::Type(plain(&full)), Count::One)))
             }
         }
@@ -293,8 +295,12 @@ impl<'a> Parser<'a> {
     }
 
     /// The name with its modules.
-    fn full(&self, name: &str) -> String {
-        self.modules.iter().chain([&name]).copied().collect::<Vec<_>>().join("::")
+    fn full(&self, name: &str) -> Result<String, String> {
+        let length = self.modules.iter().map(|module| module.len() + 2).sum::<usize>() + name.len();
+        match length <= LONGEST_NAME {
+            true => Ok(self.modules.iter().chain([&name]).copied().collect::<Vec<_>>().join("::")),
+            false => Err(odd("a name that does not end")),
+        }
     }
 }
 

@@ -13,6 +13,9 @@
 use super::definition::{Count, Field, Kind, Types, plain};
 use crate::recording::tree::Number;
 
+/// Longest name of a type with its package, in bytes: each field may have one.
+const LONGEST_NAME: usize = 1000;
+
 /// Reads the definition of `name` and those that stand behind it.
 ///
 /// # Errors
@@ -21,6 +24,9 @@ pub fn parse(name: &str, text: &str) -> Result<Types, String> {
     let mut types = Types::new();
     let (mut of, mut fields) = (plain(name), Vec::new());
     let mut head = false;
+    if of.len() > LONGEST_NAME {
+        return Err(endless());
+    }
     for line in text.lines() {
         let line = line.trim();
         if line.len() >= 3 && line.bytes().all(|byte| byte == b'=') {
@@ -30,6 +36,9 @@ pub fn parse(name: &str, text: &str) -> Result<Types, String> {
         }
         if head && let Some(name) = line.strip_prefix("MSG:") {
             (of, head) = (plain(name.trim()), false);
+            if of.len() > LONGEST_NAME {
+                return Err(endless());
+            }
             continue;
         }
         let package = of.split('/').next().unwrap_or_default();
@@ -39,6 +48,10 @@ pub fn parse(name: &str, text: &str) -> Result<Types, String> {
     }
     types.entry(of).or_insert(fields);
     Ok(types)
+}
+
+fn endless() -> String {
+    format!("have a definition with a type's name of more than {LONGEST_NAME} bytes")
 }
 
 /// The field of a line, if it has one.

@@ -1,11 +1,15 @@
 //! Samples that come line by line while they are made.
 
-use std::io::{BufRead, Read};
+use std::collections::HashSet;
+use std::io::{BufRead, ErrorKind, Read};
 use std::path::Path;
+use std::time::Duration;
 
-use scrnn_run::channels::{by_name, nameless};
-use scrnn_run::failure::{Failure, Result};
+use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use serde_json::Value;
+
+use crate::channels::{by_name, nameless, shown};
+use crate::failure::{Failure, Result};
 
 /// Columns and keys that are no channels.
 const NOT_CHANNELS: [&str; 5] = ["sequence", "step", "time", "header", "stamp"];
@@ -13,6 +17,8 @@ const NOT_CHANNELS: [&str; 5] = ["sequence", "step", "time", "header", "stamp"];
 const ABSENT: [&str; 4] = ["", "null", "NA", "None"];
 /// The longest line, in bytes.
 const LONGEST: usize = 1 << 20;
+/// Between two looks at a pipe that has nothing and does not want to be waited for.
+const PAUSE: Duration = Duration::from_millis(1);
 
 /// Lines of numbers between semicolons, commas, tabs or spaces, or of JSON objects.
 ///
@@ -78,6 +84,10 @@ impl<R: BufRead> Stream<R> {
     }
 
     /// Waits for the next sample; none at the end of the stream.
+    ///
+    /// # Errors
+    /// [`Failure::Input`] with the number of the line that is no sample; [`Failure::Disk`].
+    #[expect(clippy::should_implement_trait, reason = "an iterator that may fail would hide where it ends")]
     pub fn next(&mut self) -> Result<Option<Arrival>> {
         if let Some(sample) = self.waiting.take() {
             return Ok(Some(Arrival::Sample(sample)));
@@ -96,9 +106,15 @@ impl<R: BufRead> Stream<R> {
     /// Reads a whole line; whether there was one.
     fn read_line(&mut self) -> Result<bool> {
         self.line.clear();
-        let mut input = (&mut self.input).take(LONGEST as u64 + 1);
-        let read = input.read_until(b'\n', &mut self.line);
-        read.map_err(|error| Failure::disk("read", Path::new("the stream"), error))?;
+        loop {
+            let mut input = (&mut self.input).take((LONGEST + 1 - self.line.len()) as u64);
+            match input.read_until(b'\n', &mut self.line) {
+                Ok(_) => break,
+                // Who shares a pipe may have told the system not to wait at it: then this waits.
+                Err(error) if error.kind() == ErrorKind::WouldBlock => std::thread::sleep(PAUSE),
+                Err(error) => return Err(Failure::disk("read", Path::new("the stream"), error)),
+            }
+        }
         self.number += 1;
         if self.line.len() > LONGEST {
             let message = format!("line {} of the stream is longer than {LONGEST} bytes", self.number);
@@ -115,6 +131,8 @@ impl<R: BufRead> Stream<R> {
             let message = format!("line {} of the stream is not text: it is not UTF-8", self.number);
             Failure::input(message, format!("lines of numbers: {}", self.channels.join(", ")))
         })?;
+        // Spreadsheets mark their text by it.
+        let line = if self.number == 1 { line.strip_prefix('\u{feff}').unwrap_or(line) } else { line };
         if line.trim().is_empty() {
             self.sequence = None;
             return Ok(Some(Arrival::Gap));
@@ -173,8 +191,9 @@ impl<R: BufRead> Stream<R> {
     fn header(&self, cells: &[&str]) -> Result<Layout> {
         let needed = || format!("needed: {} numbers, or the names {}", self.channels.len(), self.channels.join(", "));
         let refused = |what: &str| {
-            let shown: Vec<String> = cells.iter().take(20).map(|cell| format!("`{}`", cell.escape_debug())).collect();
-            let message = format!("line {} of the stream, {}, {what}", self.number, shown.join(" "));
+            let found: Vec<String> =
+                cells.iter().take(20).map(|cell| format!("`{}`", shown(cell).escape_debug())).collect();
+            let message = format!("line {} of the stream, {}, {what}", self.number, found.join(" "));
             Failure::input(message, needed())
         };
         let places: Vec<usize> = (0..cells.len()).filter(|&k| !NOT_CHANNELS.contains(&cells[k])).collect();
@@ -214,7 +233,7 @@ impl<R: BufRead> Stream<R> {
             return Ok(f64::NAN);
         }
         cell.parse().map_err(|_| {
-            let (channel, cell) = (&self.channels[channel], cell.escape_debug());
+            let (channel, cell) = (&self.channels[channel], shown(cell).escape_debug().to_string());
             Failure::input(
                 format!("line {}, {channel} is `{cell}`", self.number),
                 "a number, or nothing if it is missing",
@@ -231,11 +250,15 @@ impl<R: BufRead> Stream<R> {
         if self.layout.as_ref().is_some_and(|layout| *layout != Layout::Objects) {
             return Err(refused("is a JSON object, the lines before it were none".to_owned()));
         }
-        let parsed: Value = serde_json::from_str(line)
+        let Object(object) = serde_json::from_str(line)
             .or_else(|error| serde_json::from_str(&without_non_finite(line)).map_err(|_| error))
-            .map_err(|error| refused(format!("is no JSON: {error}")))?;
-        let Value::Object(object) = &parsed else { return Err(refused("is no JSON object".to_owned())) };
-        let pairs: Vec<(&str, &Value)> = match (object.get("name"), object.get("position")) {
+            .map_err(|error| refused(format!("is no JSON object: {error}")))?;
+        let mut keys = HashSet::new();
+        if let Some((twice, _)) = object.iter().find(|&(key, _)| !keys.insert(key)) {
+            return Err(refused(format!("has `{}` more than once", shown(twice))));
+        }
+        let value = |wanted: &str| object.iter().find(|(key, _)| key == wanted).map(|(_, value)| value);
+        let pairs: Vec<(&str, &Value)> = match (value("name"), value("position")) {
             (Some(Value::Array(names)), Some(Value::Array(positions))) => {
                 if names.len() != positions.len() {
                     let what = format!("has {} names and {} positions", names.len(), positions.len());
@@ -250,15 +273,14 @@ impl<R: BufRead> Stream<R> {
         let mut names: Vec<&str> = pairs.iter().map(|(name, _)| *name).collect();
         if self.layout.is_some() {
             // All were there once: what is not there now is missing.
-            let absent: Vec<&str> =
-                self.channels.iter().map(String::as_str).filter(|name| !names.contains(name)).collect();
-            names.extend(absent);
+            let there: HashSet<&str> = names.iter().copied().collect();
+            names.extend(self.channels.iter().map(String::as_str).filter(|name| !there.contains(name)));
         }
         let order = by_name(&names, &self.channels).map_err(refused)?;
         let values = order.iter().zip(&self.channels).map(|(&k, channel)| match pairs.get(k).map(|pair| pair.1) {
             None | Some(Value::Null) => Ok(f64::NAN),
             Some(Value::Number(number)) => Ok(number.as_f64().unwrap_or(f64::NAN)),
-            Some(other) => Err(refused(format!("has {channel} as {other}"))),
+            Some(other) => Err(refused(format!("has {channel} as {}", shown(&other.to_string())))),
         });
         let sample = values.collect::<Result<Vec<_>>>()?;
         self.layout = Some(Layout::Objects);
@@ -284,13 +306,66 @@ fn split(line: &str) -> Vec<&str> {
     }
 }
 
-/// The line with null in place of what is no JSON, but is written by many programs: NaN, Infinity and -Infinity.
+/// The line with null in place of what is no number of JSON, but is written by many programs: NaN, Infinity and -Infinity, and
+/// numbers beyond all that float64 holds.
 fn without_non_finite(line: &str) -> String {
-    let parts = line.split('"').enumerate().map(|(k, part)| match k % 2 == 0 {
-        true => part.replace("-Infinity", "null").replace("Infinity", "null").replace("NaN", "null"),
-        false => part.to_owned(),
+    let is_word = |c: char| c.is_ascii_alphanumeric() || matches!(c, '+' | '-' | '.');
+    let (mut out, mut rest) = (String::with_capacity(line.len()), line);
+    while let Some(first) = rest.chars().next() {
+        let length = match first {
+            '"' => quoted(rest),
+            _ if is_word(first) => rest.find(|c| !is_word(c)).unwrap_or(rest.len()),
+            _ => first.len_utf8(),
+        };
+        let (part, after) = rest.split_at(length);
+        let is_number = part.trim_start_matches('-').starts_with(|c: char| c.is_ascii_digit());
+        let beyond = is_number && part.parse::<f64>().is_ok_and(f64::is_infinite);
+        out.push_str(if beyond || matches!(part, "NaN" | "Infinity" | "-Infinity") { "null" } else { part });
+        rest = after;
+    }
+    out
+}
+
+/// Length of the string that begins here, with its quotes.
+fn quoted(text: &str) -> usize {
+    let mut escaped = false;
+    let end = text.bytes().skip(1).position(|byte| match (escaped, byte) {
+        (true, _) => {
+            escaped = false;
+            false
+        }
+        (false, b'\\') => {
+            escaped = true;
+            false
+        }
+        (false, byte) => byte == b'"',
     });
-    parts.collect::<Vec<_>>().join("\"")
+    end.map_or(text.len(), |end| end + 2)
+}
+
+/// The keys of a JSON object with their values, in their order. What stands there twice is there twice.
+struct Object(Vec<(String, Value)>);
+
+impl<'de> Deserialize<'de> for Object {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        struct Pairs;
+        impl<'de> Visitor<'de> for Pairs {
+            type Value = Object;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("an object")
+            }
+
+            fn visit_map<M: MapAccess<'de>>(self, mut map: M) -> std::result::Result<Object, M::Error> {
+                let mut pairs = Vec::new();
+                while let Some(pair) = map.next_entry()? {
+                    pairs.push(pair);
+                }
+                Ok(Object(pairs))
+            }
+        }
+        deserializer.deserialize_map(Pairs)
+    }
 }
 
 #[cfg(test)]
