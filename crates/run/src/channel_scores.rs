@@ -16,19 +16,30 @@ pub struct ChannelScore {
     pub explained: Option<f64>,
     /// The root of the mean squared error, in the data's units. None where no sample was observed.
     pub rmse: Option<f64>,
+    /// Spikes that do not count: samples outside of -1 to 1 in scaled units, where they are few.
+    pub left_out: usize,
 }
 
-/// Scores what the open loop predicted of `scaled`. Missing samples are passed over.
+/// Share of the samples that spikes are at most. More are part of what is recorded.
+const SPIKES: f64 = 0.01;
+
+/// Scores what the open loop predicted of `scaled`. Missing samples are passed over, and so are spikes that a robust scaling left
+/// outside: nothing predicts them, and one of them outweighs all else.
 #[must_use]
 pub fn channel_scores(scaled: &Dataset, generated: &[Generated], delay: usize, scaling: &Scaling) -> Vec<ChannelScore> {
     let n = scaled.channels().len();
-    let pairs = |i: usize| {
+    let all = |i: usize| {
         scaled.sequences().iter().zip(generated).flat_map(move |(sequence, generated)| {
             let samples = sequence.values().iter().skip(delay * n + i).step_by(n).copied();
             samples.zip(generated.mean.iter().skip(i).step_by(n).copied()).filter(|(sample, _)| sample.is_finite())
         })
     };
+    let is_spike = |sample: f64| sample.abs() >= 1.0;
     let score = |(i, channel): (usize, &String)| {
+        let (spikes, samples) = all(i)
+            .fold((0, 0), |(spikes, count), (sample, _)| (spikes + usize::from(is_spike(sample)), count + 1_usize));
+        let left_out = if spikes as f64 <= SPIKES * samples as f64 { spikes } else { 0 };
+        let pairs = |i: usize| all(i).filter(move |(sample, _)| left_out == 0 || !is_spike(*sample));
         let (sum, count) = pairs(i).fold((0.0, 0_usize), |(sum, count), (sample, _)| (sum + sample, count + 1));
         let mean = sum / count.max(1) as f64;
         let squares = pairs(i).map(|(sample, y)| (sample - y).powi(2)).sum::<f64>();
@@ -36,6 +47,7 @@ pub fn channel_scores(scaled: &Dataset, generated: &[Generated], delay: usize, s
         ChannelScore {
             channel: channel.clone(),
             explained: Some(1.0 - squares / spread).filter(|share| spread > 0.0 && share.is_finite()),
+            left_out,
             rmse: (count > 0).then(|| (squares / count.max(1) as f64).sqrt() / scaling.scale()[i].abs()),
         }
     };
@@ -75,6 +87,23 @@ impl ChannelScore {
 mod tests {
     use super::*;
     use scrnn::dataset::Sequence;
+
+    #[test]
+    fn a_few_spikes_do_not_count_and_are_counted() {
+        let mut values: Vec<f64> = (0..301).map(|k| 0.5 * (f64::from(k) * 0.3).sin()).collect();
+        let mut generated = Generated::default();
+        generated.mean = values[1..].to_vec();
+        (values[7], values[8]) = (60.0, -60.0);
+        let scores = |values: Vec<f64>| {
+            let data = Dataset::new(vec!["a".into()], vec![Sequence::new("", 1, values).unwrap()]).unwrap();
+            channel_scores(&data, std::slice::from_ref(&generated), 1, &Scaling::identity(1)).swap_remove(0)
+        };
+        let few = scores(values.clone());
+        assert_eq!((few.left_out, few.explained, few.rmse), (2, Some(1.0), Some(0.0)));
+        (10..60).for_each(|k| values[k] = 60.0);
+        let many = scores(values);
+        assert!(many.left_out == 0 && many.explained.unwrap() < 0.5, "{many:?}");
+    }
 
     #[test]
     fn what_is_missing_counts_neither_as_right_nor_as_wrong() {

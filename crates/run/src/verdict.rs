@@ -115,7 +115,11 @@ impl Verdict {
             "One step ahead, the share of each channel's variance that is explained, and the rms error in its own units:"
         )?;
         for score in self.channels.iter().take(SHOWN) {
-            writeln!(f, "  {:width$}  {:>8}  {}", score.channel, score.share(), score.error())?;
+            let spikes = match score.left_out {
+                0 => String::new(),
+                count => format!("  (without {count} spikes)"),
+            };
+            writeln!(f, "  {:width$}  {:>8}  {}{spikes}", score.channel, score.share(), score.error())?;
         }
         match self.channels.len().checked_sub(SHOWN) {
             None | Some(0) => Ok(()),

@@ -107,7 +107,7 @@ mod tests {
 
     #[test]
     fn rows_behind_their_class_are_sequences() {
-        let class = |r: usize| if r % 3 == 0 { 2 } else { -1 };
+        let class = |r: usize| if r.is_multiple_of(3) { 2 } else { -1 };
         let data = read(&table(9, 31, |r, c| if c == 0 { class(r).to_string() } else { wave(r, c).to_string() }));
         assert_eq!((data.channels(), data.sequences().len()), (&["y1".to_owned()][..], 9));
         assert_eq!((data.sequences()[0].name.as_str(), data.sequences()[8].name.as_str()), ("1 2", "9 -1"));

@@ -140,7 +140,6 @@ impl Data {
                 Some(MissingName::Refuse) => Missing::Refuse,
                 Some(MissingName::Accept) | None => Missing::Accept,
             },
-            ..Selection::default()
         }
     }
 
