@@ -10,7 +10,7 @@ const VALUES: [&str; 9] =
     ["0", "1", "-1", "2147483648", "4294967296", "9223372036854775808", "18446744073709551615", "1e308", "NaN"];
 
 /// Keys of the experiment file.
-const KEYS: [&str; 22] = [
+const KEYS: [&str; 27] = [
     "seed",
     "data.seed",
     "data.sequences",
@@ -21,6 +21,11 @@ const KEYS: [&str; 22] = [
     "network.groups.context.units",
     "network.groups.context.time_constant",
     "training.epochs",
+    "training.patience",
+    "data.held_out",
+    "evaluation.every",
+    "evaluation.burn_in",
+    "evaluation.observed",
     "training.momentum.rate",
     "training.momentum.momentum",
     "training.momentum.rate_initial",

@@ -52,57 +52,110 @@ const ROWS: usize = 1024;
 
 /// Linear regression on the newest `order` samples of all channels that are known, and a constant; one for all sequences.
 /// None if there are fewer samples than coefficients.
-///
-/// ```text
-/// [X Y] = Q [R_x R_y; 0 S],   R_x w = R_y in the least squares        X: standardised regressors, Y: standardised targets
-/// ```
-///
-/// By orthogonal factors of the regressors themselves, in each channel's own unit: neither their units nor regressors that are
-/// nearly the same spoil it, as they would in normal equations.
 #[must_use]
 pub fn autoregression(data: &Dataset, delay: usize, order: usize) -> Option<f64> {
-    let n = data.channels().len();
-    let width = order * n + 1;
-    let first = delay + order.saturating_sub(1);
-    let places: Vec<(&Sequence, usize)> =
-        data.sequences().iter().flat_map(|sequence| (first..sequence.len()).map(move |k| (sequence, k))).collect();
-    if places.len() <= width {
-        return None;
+    let model = Linear::fit(data, delay, order)?;
+    of_errors(data.channels().len(), |i| Some(model.variances[i]))
+}
+
+/// A Gaussian of constant variance for each channel around a linear function of the newest samples, fitted to some sequences and used
+/// on others.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Linear {
+    delay: usize,
+    order: usize,
+    /// Where each channel begins, and how long its unit is.
+    units: Vec<(f64, f64)>,
+    /// Of standardised regressors, to standardised channels.
+    weights: DMatrix<f64>,
+    variances: Vec<f64>,
+}
+
+impl Linear {
+    /// Fits the `order` newest samples that a prediction over `delay` steps knows, and a constant, by least squares. None if there are
+    /// fewer samples than coefficients.
+    ///
+    /// ```text
+    /// [X Y] = Q [R_x R_y; 0 S],   R_x w = R_y in the least squares        X: standardised regressors, Y: standardised targets
+    /// ```
+    ///
+    /// By orthogonal factors of the regressors themselves, in each channel's own unit: neither their units nor regressors that are
+    /// nearly the same spoil it, as they would in normal equations. Samples that are missing (not a number) are left out, with all
+    /// that would be predicted from them.
+    #[must_use]
+    pub fn fit(data: &Dataset, delay: usize, order: usize) -> Option<Self> {
+        let n = data.channels().len();
+        let width = order * n + 1;
+        let units: Vec<(f64, f64)> = (0..n).map(|i| unit(data, i)).collect::<Option<_>>()?;
+        let mut model = Self { delay, order, units, weights: DMatrix::zeros(width, n), variances: vec![0.0; n] };
+        let first = model.first();
+        let places: Vec<(&Sequence, usize)> = data
+            .sequences()
+            .iter()
+            .flat_map(|sequence| (first..sequence.len()).map(move |k| (sequence, k)))
+            .filter(|&(sequence, k)| model.row(sequence, k).iter().all(|value| value.is_finite()))
+            .collect();
+        if places.len() <= width {
+            return None;
+        }
+        // The triangle of all rows so far, above the next ones, makes the triangle of both.
+        let mut triangle = DMatrix::zeros(0, width + n);
+        for places in places.chunks(ROWS) {
+            let above = triangle.nrows();
+            let mut stacked = triangle.resize_vertically(above + places.len(), 0.0);
+            for (k, &(sequence, at)) in places.iter().enumerate() {
+                stacked.row_mut(above + k).iter_mut().zip(model.row(sequence, at)).for_each(|(to, value)| *to = value);
+            }
+            triangle = stacked.qr().r();
+        }
+        let (x, y) = (triangle.view((0, 0), (width, width)).into_owned(), triangle.view((0, width), (width, n)));
+        let factors = x.svd(true, true);
+        model.weights = factors.solve(&y, RELATIVE_CUT * factors.singular_values.max()).ok()?;
+        for &(sequence, k) in &places {
+            for (i, (predicted, target)) in model.predict(sequence, k).iter().zip(sequence.sample(k)).enumerate() {
+                model.variances[i] += (target - predicted).powi(2) / places.len() as f64;
+            }
+        }
+        Some(model)
     }
-    let units: Vec<(f64, f64)> = (0..n).map(|i| unit(data, i)).collect::<Option<_>>()?;
-    // A row of [X Y].
-    let row = |(sequence, k): (&Sequence, usize)| -> Vec<f64> {
+
+    /// The first sample of a sequence that it can predict.
+    #[must_use]
+    pub fn first(&self) -> usize {
+        self.delay + self.order.saturating_sub(1)
+    }
+
+    /// What it predicts for sample `k`, at least [`Linear::first`], from the samples up to `k - delay`.
+    ///
+    /// # Panics
+    /// If there is no such sample, or it is one of another number of channels.
+    #[must_use]
+    pub fn predict(&self, sequence: &Sequence, k: usize) -> Vec<f64> {
+        let row = self.row(sequence, k);
         let standard =
-            |k: usize| sequence.sample(k).iter().zip(&units).map(|(value, (start, length))| (value - start) / length);
-        (0..order).flat_map(|lag| standard(k - delay - lag)).chain([1.0]).chain(standard(k)).collect()
-    };
-    // The triangle of all rows so far, above the next ones, makes the triangle of both.
-    let mut triangle = DMatrix::zeros(0, width + n);
-    for places in places.chunks(ROWS) {
-        let above = triangle.nrows();
-        let mut stacked = triangle.resize_vertically(above + places.len(), 0.0);
-        for (k, &place) in places.iter().enumerate() {
-            stacked.row_mut(above + k).iter_mut().zip(row(place)).for_each(|(to, value)| *to = value);
-        }
-        triangle = stacked.qr().r();
+            self.weights.column_iter().map(|weights| row.iter().zip(weights.iter()).map(|(x, w)| x * w).sum::<f64>());
+        standard.zip(&self.units).map(|(value, (start, length))| start + length * value).collect()
     }
-    let (x, y) = (triangle.view((0, 0), (width, width)).into_owned(), triangle.view((0, width), (width, n)));
-    let factors = x.svd(true, true);
-    let weights = factors.solve(&y, RELATIVE_CUT * factors.singular_values.max()).ok()?;
-    let mut squares = vec![0.0; n];
-    for &place in &places {
-        let row = row(place);
-        for ((square, weights), target) in squares.iter_mut().zip(weights.column_iter()).zip(&row[width..]) {
-            let predicted: f64 = row.iter().zip(weights.iter()).map(|(x, w)| x * w).sum();
-            *square += (target - predicted).powi(2) / places.len() as f64;
-        }
+
+    /// The variance of each channel's error on the sequences that it was fitted to.
+    #[must_use]
+    pub fn variances(&self) -> &[f64] {
+        &self.variances
     }
-    of_errors(n, |i| Some(squares[i] * units[i].1.powi(2)))
+
+    /// A row of [X Y].
+    fn row(&self, sequence: &Sequence, k: usize) -> Vec<f64> {
+        let standard = |k: usize| {
+            sequence.sample(k).iter().zip(&self.units).map(|(value, (start, length))| (value - start) / length)
+        };
+        (0..self.order).flat_map(|lag| standard(k - self.delay - lag)).chain([1.0]).chain(standard(k)).collect()
+    }
 }
 
 /// Mean and standard deviation of channel `i`, or 1 where it never changes: where it begins, and how long its unit is.
 fn unit(data: &Dataset, i: usize) -> Option<(f64, f64)> {
-    let values: Vec<f64> = data.sequences().iter().flat_map(|sequence| from(sequence, 0, i)).collect();
+    let values: Vec<f64> =
+        data.sequences().iter().flat_map(|sequence| from(sequence, 0, i)).filter(|value| value.is_finite()).collect();
     let deviation = mean_square_about_mean(&values)?.sqrt();
     Some((mean(&values)?, if deviation > 0.0 { deviation } else { 1.0 }))
 }
@@ -166,6 +219,19 @@ mod tests {
         assert!((one - gaussian_entropy(0.5 * (1.0 - 1.0_f64.cos().powi(2)))).abs() < 0.01, "{one}");
         assert!(one < constant(&data, 1).unwrap());
         assert_eq!(autoregression(&set(&[&[1.0, 2.0, 3.0]]), 1, 4), None);
+    }
+
+    #[test]
+    fn a_linear_model_predicts_sequences_that_it_was_not_fitted_to() {
+        let noise = |k: i32| 1e-3 * f64::from(k * k * k).sin();
+        let wave = |phase: f64| (0..300).map(|k| 5.0 + (f64::from(k) + phase).sin() + noise(k)).collect::<Vec<_>>();
+        let model = Linear::fit(&set(&[&wave(0.0), &wave(1.0)]), 1, 4).unwrap();
+        let other = set(&[&wave(2.0)]);
+        let sequence = &other.sequences()[0];
+        assert_eq!(model.first(), 4);
+        let errors =
+            (4..300).map(|k| (model.predict(sequence, k)[0] - sequence.sample(k)[0]).powi(2)).sum::<f64>() / 296.0;
+        assert!(errors < 1e-5 && (errors / model.variances()[0] - 1.0).abs() < 0.2, "{errors} {:?}", model.variances());
     }
 
     /// Two channels of which one is a smooth wave, and the other follows it with noise, each in a unit of its own.
