@@ -4,12 +4,16 @@
 mod channels;
 #[path = "cli/crafted.rs"]
 mod crafted;
+#[path = "cli/evaluating.rs"]
+mod evaluating;
 #[path = "cli/experiments.rs"]
 mod experiments;
 #[path = "cli/extremes.rs"]
 mod extremes;
 #[path = "cli/following.rs"]
 mod following;
+#[path = "cli/held_out.rs"]
+mod held_out;
 #[path = "cli/numbers.rs"]
 mod numbers;
 #[path = "cli/numbers_table.rs"]
@@ -32,7 +36,8 @@ mod strangers;
 mod using;
 
 use std::path::PathBuf;
-use std::process::Output;
+use std::process::{Output, Stdio};
+use std::time::Duration;
 
 use assert_cmd::Command;
 use serde_json::Value;
@@ -128,6 +133,18 @@ impl Place {
         let err = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(0), "scrnn {line}\n{err}");
         (String::from_utf8(output.stdout).unwrap(), err)
+    }
+
+    /// Runs a command and kills it after so many milliseconds; whether it had ended before.
+    fn stopped_after(&self, milliseconds: u64, line: &str) -> bool {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_scrnn"));
+        command.current_dir(&self.0).args(line.split_whitespace());
+        let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(milliseconds));
+        let ended = child.try_wait().unwrap().is_some();
+        let _ = child.kill();
+        child.wait().unwrap();
+        ended
     }
 
     /// Runs a command that should end with `code`; its stderr as printed, and with line breaks taken out.

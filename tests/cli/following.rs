@@ -67,7 +67,7 @@ fn a_stream_is_answered_line_by_line_with_what_a_file_gives() {
     let (_, out, _) = stream("recognize run - --online --window 8 --steps 5 --ahead 2 --json", &samples);
     let answer: Value = serde_json::from_str(out.lines().nth(39).unwrap()).unwrap();
     let keys: Vec<&str> = answer.as_object().unwrap().keys().map(String::as_str).collect();
-    assert_eq!(keys, ["forecast", "ln_likelihood", "mean", "milliseconds", "sample", "variance"]);
+    assert_eq!(keys, ["forecast", "ln_likelihood", "locked", "mean", "milliseconds", "sample", "variance"]);
     let predicted = numbers(&lines[39]["view"]["predicted"]);
     assert_eq!([numbers(&answer["mean"]), numbers(&answer["forecast"])].concat(), predicted[..3]);
     // A table for those who do not want JSON: the next sample as predicted.
@@ -254,4 +254,46 @@ fn two_robots_are_recorded_learned_from_and_followed() {
     assert!(told.contains("did not learn `RRRRR`") && told.contains("LLLLR"), "{told}");
     let (_, told) = place.fails(2, "simulate interact run --order LX");
     assert!(told.contains("`LX`"), "{told}");
+}
+
+/// Three learned waves that begin at different places, and one that none of them is like.
+fn waves(place: &Place) {
+    let wave = |name: &str, phase: f64, scale: f64, rate: f64| -> String {
+        let row =
+            |k: u32| format!("{name},{}\n", scale * (rate * f64::from(k) + phase).sin() + 0.02 * f64::from(k * k % 7));
+        (0..60).map(row).collect()
+    };
+    let learned: String = (0..3_u32).map(|s| wave(&format!("w{s}"), 2.0 * f64::from(s), 1.0, 0.3)).collect();
+    place.write("waves.csv", format!("sequence,y\n{learned}"));
+    place.write("known.csv", format!("sequence,y\n{}", wave("k", 2.0, 1.0, 0.3)));
+    place.write("strange.csv", format!("sequence,y\n{}", wave("s", 0.0, 1.0, 2.5)));
+    let experiment = "name = \"waves\"\n[data]\nfiles = [\"waves.csv\"]\n[[network.groups]]\nname = \"context\"\nunits = 8\n\
+                      time_constant = 2.0\n[training]\nepochs = 600\noptimiser = \"adam\"\n[training.adam]\nrate = 0.01\n";
+    place.write("waves.toml", experiment);
+    place.ok("train waves.toml --out run -q");
+}
+
+#[test]
+fn following_begins_from_the_best_learned_state_and_says_when_nothing_learned_is_found() {
+    let place = Place::new();
+    waves(&place);
+    let line = "--online --window 10 --steps 5 --json";
+    let followed = |arguments: &str| place.json(&format!("recognize run {arguments} {line}"))["sequences"][0].clone();
+    let known = followed("known.csv");
+    assert!(known["locked"].as_f64().unwrap() > 0.6, "{}", known["locked"]);
+    assert_eq!(known["steps"].as_array().unwrap().last().unwrap()["locked"], true);
+    let strange = followed("strange.csv");
+    assert!(strange["locked"].as_f64().unwrap() < 0.4, "{}", strange["locked"]);
+    let err = String::from_utf8(place.run("recognize run strange.csv --online --window 10 --steps 5").stderr).unwrap();
+    assert!(err.contains("was not found: the window at its end is less likely than what was learned"), "{err}");
+    // After a few samples the learned state takes the mean's place; before that nothing differs.
+    let from_mean = followed("known.csv --mean");
+    let likelihood = |one: &Value, k: usize| numbers(&one["steps"][k]["ln_likelihood"])[0];
+    assert_eq!(likelihood(&known, 2), likelihood(&from_mean, 2));
+    assert!(
+        likelihood(&known, 7) > likelihood(&from_mean, 7),
+        "{} {}",
+        likelihood(&known, 7),
+        likelihood(&from_mean, 7)
+    );
 }

@@ -11,7 +11,7 @@ const VALUES: [&str; 10] =
     ["0", "1", "2", "-1", "2147483648", "4294967296", "9223372036854775808", "18446744073709551615", "1e308", "NaN"];
 
 /// Keys of the experiment file.
-const KEYS: [&str; 35] = [
+const KEYS: [&str; 40] = [
     "seed",
     "data.seed",
     "data.sequences",
@@ -22,6 +22,11 @@ const KEYS: [&str; 35] = [
     "network.groups.context.units",
     "network.groups.context.time_constant",
     "training.epochs",
+    "training.patience",
+    "data.held_out",
+    "evaluation.every",
+    "evaluation.burn_in",
+    "evaluation.observed",
     "training.momentum.rate",
     "training.momentum.momentum",
     "training.momentum.rate_initial",
@@ -47,6 +52,8 @@ const KEYS: [&str; 35] = [
     "output.history_every",
     "output.checkpoint_every",
     "output.checkpoint_seconds",
+    "data.rest",
+    "training.members",
 ];
 
 /// Runs a line for so long at most; the exit code, unless it had to be stopped, and what it said.

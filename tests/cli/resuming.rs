@@ -8,7 +8,7 @@ use crate::{Place, SINE, epochs, sine_in_batches, sine_with_adam, sine_with_lbfg
 /// The files that must come out the same.
 const RESULTS: [&str; 2] = ["checkpoint.safetensors", "best.safetensors"];
 
-fn same_results(place: &Place, a: &str, b: &str) {
+pub fn same_results(place: &Place, a: &str, b: &str) {
     for name in RESULTS {
         assert!(place.read(&format!("{a}/{name}")) == place.read(&format!("{b}/{name}")), "{name} differs");
     }

@@ -9,6 +9,7 @@ use scrnn_data::{Axes, Selection, TimeSource};
 use scrnn_run::experiment::Override;
 use scrnn_run::failure::Result;
 use scrnn_run::messages::Messages;
+use scrnn_run::trained::Trained;
 use scrnn_tasks::TaskName;
 
 use crate::output;
@@ -43,6 +44,13 @@ impl Shared {
     /// The vector instructions in use.
     pub fn instruction_set(&self) -> InstructionSet {
         self.instruction_set.unwrap_or_else(InstructionSet::best)
+    }
+
+    /// Says what is to be known of a network before its variances are used.
+    pub fn say_of(&self, trained: &Trained) {
+        if let Some(remark) = trained.remark() {
+            self.say(remark);
+        }
     }
 
     /// Says something on stderr, unless told to be quiet.

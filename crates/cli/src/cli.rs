@@ -6,7 +6,9 @@ use clap::{Parser, Subcommand};
 use scrnn::engine::InstructionSet;
 
 use crate::args::Shared;
-use crate::command::{completions, convert, data, generate, inspect, recognize, report, reproduce, simulate, train};
+use crate::command::{
+    completions, convert, data, evaluate, generate, inspect, recognize, report, reproduce, simulate, train,
+};
 
 static VERSION: LazyLock<String> =
     LazyLock::new(|| format!("{} (instruction set {})", env!("CARGO_PKG_VERSION"), InstructionSet::best()));
@@ -25,6 +27,7 @@ And on data of your own:
   scrnn inspect mine.csv --plot mine.html               and what they look like
   scrnn train mine.csv                                  with settings that suit the data, into runs/mine
   scrnn recognize runs/mine new.csv                     which learned sequence is this?
+  scrnn evaluate runs/mine new.csv                      how well does it do on what it did not learn?
   scrnn report runs/mine                                the run as a page
 
 Results go to stdout, progress and messages to stderr. Sequences count from 1, as in the thesis.
@@ -59,6 +62,7 @@ pub enum Command {
     Train(train::Arguments),
     Generate(generate::Arguments),
     Recognize(recognize::Arguments),
+    Evaluate(evaluate::Arguments),
     Simulate(simulate::Arguments),
     Reproduce(reproduce::Arguments),
     Report(report::Arguments),

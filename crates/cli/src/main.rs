@@ -35,6 +35,7 @@ fn run() -> u8 {
         Command::Train(arguments) => command::train::run(&arguments, (&shared, &signals)),
         Command::Generate(arguments) => command::generate::run(&arguments, &shared),
         Command::Recognize(arguments) => command::recognize::run(&arguments, &shared),
+        Command::Evaluate(arguments) => command::evaluate::run(&arguments, &shared),
         Command::Simulate(arguments) => command::simulate::run(&arguments, &shared),
         Command::Reproduce(arguments) => command::reproduce::run(&arguments, (&shared, &signals)),
         Command::Report(arguments) => command::report::run(&arguments, &shared),

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use scrnn::learning::EpochReport;
 use scrnn_report::in_words;
+use scrnn_run::held_out::Glance;
 use scrnn_run::messages;
 
 use crate::output;
@@ -44,6 +45,8 @@ struct Progress {
     total: u64,
     start: Option<(u64, Instant)>,
     shown: Instant,
+    /// What the last look at sequences that are held out came to.
+    held_out: Option<String>,
 }
 
 #[derive(Debug)]
@@ -64,11 +67,17 @@ impl Progress {
         } else {
             Display::Lines
         };
-        Self { label: label.to_owned(), display, total, start: None, shown: Instant::now() }
+        Self { label: label.to_owned(), display, total, start: None, shown: Instant::now(), held_out: None }
     }
 }
 
 impl messages::Progress for Progress {
+    /// Keeps what is shown with the next epochs.
+    fn held_out(&mut self, glance: &Glance) {
+        let value = glance.one_step.nll.map_or(format!("{:.3e}", glance.one_step.mse), |nll| format!("{nll:.4}"));
+        self.held_out = Some(format!("{value}, alone {:.3} off", glance.closed_loop.distance));
+    }
+
     /// Shows where training stands, if it is time to.
     fn epoch(&mut self, report: &EpochReport) {
         let now = Instant::now();
@@ -87,6 +96,9 @@ impl messages::Progress for Progress {
             Some(nll) => format!("nll {nll:.4}"),
             None => format!("mse {:.3e}", report.mse),
         };
+        if let Some(held_out) = &self.held_out {
+            message += &format!("  held out {held_out}");
+        }
         message += &format!("  rate {:.1e}", report.rate_shared);
         if speed > 0.0 {
             let left = left(self.total.saturating_sub(report.epoch), speed);

@@ -23,6 +23,13 @@ pub fn learning_curves(file: &str, title: &str, runs: &[(String, &[Row])], floor
             }
         })
         .collect();
+    if let [(_, rows)] = runs {
+        let held_out = |row: &Row| row.held_out.map(|held_out| if with_variance { held_out } else { held_out.log10() });
+        let points: Vec<(f64, f64)> = rows.iter().filter_map(|row| Some((row.epoch as f64, held_out(row)?))).collect();
+        if !points.is_empty() {
+            series.push(Series::line("sequences that are held out", Tone::Level(2), points));
+        }
+    }
     let last = series.iter().filter_map(|series| series.points.last()).map(|point| point.0).fold(1.0, f64::max);
     if let Some(floor) = floor.filter(|_| with_variance) {
         series.push(Series::line("entropy of the noise", Tone::Truth, vec![(0.0, floor), (last, floor)]));

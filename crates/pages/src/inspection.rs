@@ -45,6 +45,8 @@ pub fn network_object(trained: &Trained) -> Value {
             json!({ "name": checkpoint.channels[i], "low": low, "high": high })
         }).collect::<Vec<_>>(),
         "sequences": checkpoint.sequences,
+        "held_out": notes.and_then(|notes| notes.data.held_out.as_ref()).map(|held_out| &held_out.names),
+        "variance_factor": notes.and_then(|notes| notes.variance_factor.as_ref()),
         "lengths": notes.map(|notes| &notes.data.lengths),
         "experiment": notes.map(|notes| &notes.experiment),
     })
@@ -95,6 +97,12 @@ pub fn network_text(trained: &Trained, path: &Path) -> String {
     }
     let lengths = notes.as_ref().map(|notes| lengths(&notes.data.lengths)).unwrap_or_default();
     line("sequences", format!("{}{lengths}", checkpoint.sequences.len()));
+    if let Some(held_out) = notes.as_ref().and_then(|notes| notes.data.held_out.as_ref()) {
+        line("held out", held_out.names.join(", "));
+    }
+    if let Some(factor) = notes.as_ref().and_then(|notes| notes.variance_factor.as_ref()) {
+        line("calibrated", factor.in_words(&checkpoint.channels));
+    }
     if let Some(optimiser) = experiment.and_then(|experiment| experiment["training"]["optimiser"].as_str()) {
         let refined = experiment.is_some_and(|experiment| experiment["training"]["lbfgs"].is_object());
         line("optimiser", format!("{optimiser}{}", if refined { ", then L-BFGS" } else { "" }));
@@ -110,10 +118,12 @@ fn reach(checkpoint: &Checkpoint, channel: usize) -> (f64, f64) {
 }
 
 fn told(score: Score) -> String {
-    match score.nll {
-        Some(nll) => format!("nll {nll:.4} nats per step and channel, mse {:.4e}", score.mse),
-        None => format!("mse {:.4e} per step and channel", score.mse),
-    }
+    let one = |nll: Option<f64>, mse: f64| match nll {
+        Some(nll) => format!("nll {nll:.4} nats per step and channel, mse {mse:.4e}"),
+        None => format!("mse {mse:.4e} per step and channel"),
+    };
+    let held_out = score.held_out.map(|held_out| format!("; held out: {}", one(held_out.nll, held_out.mse)));
+    format!("{}{}", one(score.nll, score.mse), held_out.unwrap_or_default())
 }
 
 /// Data as JSON.

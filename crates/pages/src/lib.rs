@@ -2,7 +2,9 @@
 
 mod blocks;
 pub mod data_page;
+mod held_out;
 pub mod inspection;
+pub mod mixture_page;
 pub mod run_page;
 mod writing;
 

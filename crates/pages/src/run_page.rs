@@ -8,25 +8,28 @@ use scrnn::generation::{Feedback, Generated, GenerationOptions};
 use scrnn_report::{Block, Chart, Figure, Mark, Page, Panel, Section, Series, Sheet, Tone};
 use scrnn_run::assessment::{self, Assessment, Predictions};
 use scrnn_run::channel_scores::{ChannelScore, channel_scores};
+use scrnn_run::evaluation::Member;
 use scrnn_run::experiment::Experiment;
 use scrnn_run::failure::Result;
+use scrnn_run::held_out::Watch;
 use scrnn_run::history::Row;
-use scrnn_run::source;
+use scrnn_run::source::Source;
 use scrnn_run::trained::Trained;
 
-use crate::{calibration_blocks, learning_curves};
+use crate::{calibration_blocks, held_out, learning_curves};
 
 /// Sequences that are drawn over time.
 const DRAWN: usize = 4;
 /// Samples of each.
 const SAMPLES: usize = 300;
 
-/// The page about a run: how it learned (`rows` of its history), how it predicts `data`, which it learned, and how it runs on
-/// its own with noise of this seed.
+/// The page about a run: how it learned (`rows` of its history), how it predicts the sequences of `source`, those that it learned
+/// and those that were held out, and how it runs on its own with noise of this seed.
 ///
 /// # Errors
 /// What is wrong with the run's data.
-pub fn page(trained: &Trained, data: &Dataset, rows: &[Row], seed: u64, engine: &Engine) -> Result<Page> {
+pub fn page(trained: &Trained, source: &Source, rows: &[Row], seed: u64, engine: &Engine) -> Result<Page> {
+    let data = &source.data;
     let (checkpoint, network) = (&trained.checkpoint, trained.network());
     let scaled = checkpoint.scaling.apply(data);
     let (n, delay) = (scaled.channels().len(), network.topology().delay());
@@ -40,12 +43,16 @@ pub fn page(trained: &Trained, data: &Dataset, rows: &[Row], seed: u64, engine: 
     .seed(seed);
     let closed = assessment::run(&network, &states, &scaled, &options, engine)?;
 
-    let mut assessment = Assessment::new(&scaled, &Predictions::of(&open, &scaled, delay), None, delay);
     let experiment = trained.notes.as_ref().map(|notes| &notes.experiment);
     let experiment: Option<Experiment> = experiment.and_then(|value| serde_json::from_value(value.clone()).ok());
-    if let Some(experiment) = &experiment
-        && let Some(truth) = source::load(&experiment.data, engine.threads())?.truth
-    {
+    let watch = match &experiment {
+        Some(experiment) => Watch::new(experiment, (source, &checkpoint.scaling, &scaled), delay, engine)?,
+        None => None,
+    };
+    let members = [Member { network: &network, states: initial_states }];
+    let new = watch.as_ref().map(|watch| watch.predictions(&members)).transpose()?;
+    let mut assessment = Assessment::new(&scaled, &Predictions::of(&open, &scaled, delay), new.as_ref(), delay);
+    if let Some(truth) = &source.truth {
         // In scaled units, as all of the assessment.
         let scale = checkpoint.scaling.scale();
         let variances = truth.variances.map(|channel, v| v * scale[channel].powi(2));
@@ -80,6 +87,11 @@ pub fn page(trained: &Trained, data: &Dataset, rows: &[Row], seed: u64, engine: 
         Section { title: "One step ahead".into(), blocks: ahead },
         Section { title: "On its own".into(), blocks: drawn(data, trained, &closed, false) },
     ];
+    if let (Some(watch), Some(experiment)) = (&watch, &experiment) {
+        let variance = experiment.network.initial_state_variance;
+        let judgement = watch.judge(&members, checkpoint.epoch, variance)?;
+        sections.insert(2, held_out::section(&judgement));
+    }
     sections.extend(initial_state_plane(trained));
     if let Some(experiment) = &experiment {
         let text = toml::to_string(experiment).unwrap_or_default();

@@ -1,6 +1,8 @@
 //! How well a network predicts one step ahead: its nll, beside the noise's own entropy and simple models, and whether
 //! its variances are as large as its errors.
 
+use std::ops::Range;
+
 use scrnn::analysis::baselines;
 use scrnn::analysis::calibration::Calibration;
 use scrnn::dataset::Dataset;
@@ -80,15 +82,20 @@ pub fn open_loop(network: &Network, states: &[&[f64]], data: &Dataset, engine: &
 impl Predictions {
     /// Of what the open loop predicted on `data`. Missing samples are passed over.
     pub fn of(generated: &[Generated], data: &Dataset, delay: usize) -> Self {
+        let whole: Vec<Range<usize>> = data.sequences().iter().map(|sequence| delay..sequence.len()).collect();
+        Self::of_ranges(generated, data, (delay, &whole))
+    }
+
+    /// Of these samples of each sequence, none of them among the first `delay`. Samples that are missing (not a number) are left out.
+    pub fn of_ranges(generated: &[Generated], data: &Dataset, (delay, ranges): (usize, &[Range<usize>])) -> Self {
         let n = data.channels().len();
         let (mut errors, mut variances) = (Vec::new(), Vec::new());
-        for (generated, sequence) in generated.iter().zip(data.sequences()) {
-            let count = (sequence.len() - delay) * n;
-            let targets = &sequence.values()[delay * n..];
-            let there = |k: &usize| !targets[*k].is_nan();
-            errors.extend((0..count).filter(there).map(|k| targets[k] - generated.mean[k]));
-            if !generated.variance.is_empty() {
-                variances.extend((0..count).filter(there).map(|k| generated.variance[k]));
+        for ((generated, sequence), range) in generated.iter().zip(data.sequences()).zip(ranges) {
+            let targets = &sequence.values()[range.start * n..range.end * n];
+            for (at, target) in targets.iter().enumerate().filter(|(_, target)| !target.is_nan()) {
+                let at = (range.start - delay) * n + at;
+                errors.push(target - generated.mean[at]);
+                variances.extend(generated.variance.get(at));
             }
         }
         Self { errors, variances }

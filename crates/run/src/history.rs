@@ -11,10 +11,24 @@ use std::path::Path;
 use scrnn::learning::EpochReport;
 
 use crate::failure::{Failure, Result};
+use crate::held_out::Glance;
 use crate::messages::Messages;
 use crate::run_folder::{HISTORY, RunFolder};
 
-const HEADER: &str = "epoch,nll,mse,rate_shared,rate_initial,gradient_norm,seconds,recoveries\n";
+const HEADER: &str = "epoch,nll,mse,rate_shared,rate_initial,gradient_norm,seconds,recoveries";
+
+/// What follows where sequences are held out; empty in rows of epochs without a look at them. One step ahead from the mean initial state,
+/// after the burn-in; then the closed loop: root mean squared distances after so many steps and at the end, and shares of samples within
+/// one and two standard deviations.
+const HELD_OUT: &str =
+    ",held_out_nll,held_out_mse,closed_loop_1,closed_loop_5,closed_loop_20,closed_loop_end,within_1,within_2";
+
+/// Fields of a row: in files from before trainings were reset, today, and with sequences that are held out.
+const FIELDS: (usize, usize, usize) = (7, 8, 16);
+
+fn header(held_out: bool) -> String {
+    format!("{HEADER}{}\n", if held_out { HELD_OUT } else { "" })
+}
 
 /// What a row says that learning curves are drawn from.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +41,8 @@ pub struct Row {
     pub mse: f64,
     /// How often the training was reset to its best network so far.
     pub recoveries: u64,
+    /// nll, or the squared error without variance units, on sequences that are held out, where they were looked at.
+    pub held_out: Option<f64>,
 }
 
 /// The rows of a history file, up to the first that is not whole.
@@ -46,7 +62,10 @@ pub fn rows(bytes: &[u8]) -> Vec<Row> {
         let mse = fields.next()?.parse().ok()?;
         // Files from before trainings were reset lack the last column.
         let recoveries = fields.nth(4).map_or(Some(0), |field| field.parse().ok())?;
-        Some(Row { epoch, nll: nll.parse().ok(), mse, recoveries })
+        let nll = nll.parse().ok();
+        let held_out: [Option<f64>; 2] = [(); 2].map(|()| fields.next().and_then(|field| field.parse().ok()));
+        let held_out = if nll.is_some() { held_out[0] } else { held_out[1] };
+        Some(Row { epoch, nll, mse, recoveries, held_out })
     };
     cut(bytes, u64::MAX).kept.lines().map_while(row).collect()
 }
@@ -90,13 +109,18 @@ pub fn cut(bytes: &[u8], epoch: u64) -> Cut {
     found
 }
 
-/// Epoch and seconds of a row. A field may be empty where a network has no nll.
+/// Epoch and seconds of a row. A field may be empty where a network has no nll, and where sequences that are held out were not looked
+/// at.
 fn row_of(line: &str) -> Option<(u64, f64)> {
-    let fields: Vec<&str> = line.trim_end_matches(['\r', '\n']).split(',').take(9).collect();
-    let numbers =
-        fields.iter().enumerate().all(|(k, field)| k == 1 && field.is_empty() || field.parse::<f64>().is_ok());
+    let fields: Vec<&str> = line.trim_end_matches(['\r', '\n']).split(',').take(FIELDS.2 + 1).collect();
+    let numbers = fields
+        .iter()
+        .enumerate()
+        .all(|(k, field)| (k == 1 || k >= FIELDS.1) && field.is_empty() || field.parse::<f64>().is_ok());
     // Files from before trainings were reset lack the last column.
-    if !numbers || !(7..=8).contains(&fields.len()) || fields.get(7).is_some_and(|field| field.parse::<u64>().is_err())
+    if !numbers
+        || ![FIELDS.0, FIELDS.1, FIELDS.2].contains(&fields.len())
+        || fields.get(7).is_some_and(|field| field.parse::<u64>().is_err())
     {
         return None;
     }
@@ -112,21 +136,22 @@ fn read_bytes(path: &Path) -> Result<Vec<u8>> {
 #[derive(Debug)]
 pub struct History {
     waiting: String,
+    held_out: bool,
     last_epoch: Option<u64>,
     seconds_before: f64,
 }
 
 impl History {
-    /// Starts an empty file.
-    pub fn start(run: &RunFolder) -> Result<Self> {
-        run.write(HISTORY, HEADER.as_bytes())?;
-        Ok(Self { waiting: String::new(), last_epoch: None, seconds_before: 0.0 })
+    /// Starts an empty file, with columns for sequences that are held out or without them.
+    pub fn start(run: &RunFolder, held_out: bool) -> Result<Self> {
+        run.write(HISTORY, header(held_out).as_bytes())?;
+        Ok(Self { waiting: String::new(), held_out, last_epoch: None, seconds_before: 0.0 })
     }
 
     /// Goes on with the file of a run whose checkpoint stands at `epoch`.
     ///
     /// Damage before that is said: the rows from there on are lost, the training is not.
-    pub fn go_on(run: &RunFolder, epoch: u64, messages: &dyn Messages) -> Result<Self> {
+    pub fn go_on(run: &RunFolder, (epoch, held_out): (u64, bool), messages: &dyn Messages) -> Result<Self> {
         let path = run.file(HISTORY);
         let bytes = match path.exists() {
             true => read_bytes(&path)?,
@@ -139,9 +164,9 @@ impl History {
                 path.display()
             ));
         }
-        run.write(HISTORY, format!("{HEADER}{kept}").as_bytes())?;
+        run.write(HISTORY, format!("{}{kept}", header(held_out)).as_bytes())?;
         let (last_epoch, seconds_before) = last.map_or((None, 0.0), |(epoch, seconds)| (Some(epoch), seconds));
-        Ok(Self { waiting: String::new(), last_epoch, seconds_before })
+        Ok(Self { waiting: String::new(), held_out, last_epoch, seconds_before })
     }
 
     /// Seconds that earlier processes spent on the run.
@@ -150,7 +175,7 @@ impl History {
     }
 
     /// Takes a row; `seconds` count from the start of this process' training.
-    pub fn row(&mut self, report: &EpochReport, seconds: f64) {
+    pub fn row(&mut self, report: &EpochReport, seconds: f64, glance: Option<&Glance>) {
         if self.last_epoch.is_some_and(|last| report.epoch <= last) {
             return;
         }
@@ -158,9 +183,14 @@ impl History {
         let nll = report.nll.map_or(String::new(), |nll| format!("{nll:?}"));
         let EpochReport { epoch, mse, rate_shared, rate_initial, gradient_norm, recoveries, .. } = report;
         let seconds = self.seconds_before + seconds;
+        let held_out = match (self.held_out, glance) {
+            (false, _) => String::new(),
+            (true, None) => ",".repeat(HELD_OUT.matches(',').count()),
+            (true, Some(glance)) => held_out(glance),
+        };
         writeln!(
             self.waiting,
-            "{epoch},{nll},{mse:?},{rate_shared:?},{rate_initial:?},{gradient_norm:?},{seconds:.3},{recoveries}"
+            "{epoch},{nll},{mse:?},{rate_shared:?},{rate_initial:?},{gradient_norm:?},{seconds:.3},{recoveries}{held_out}"
         )
         .expect("a string takes all");
     }
@@ -182,6 +212,15 @@ impl History {
     }
 }
 
+/// The columns of a look at what is held out.
+fn held_out(glance: &Glance) -> String {
+    let Glance { one_step, closed_loop } = glance;
+    let mut values = vec![one_step.nll, Some(one_step.mse)];
+    values.extend(closed_loop.after.iter().map(|after| after.distance));
+    values.extend([Some(closed_loop.end), closed_loop.within_one, closed_loop.within_two]);
+    values.into_iter().map(|value| value.map_or(",".to_owned(), |value| format!(",{value:?}"))).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -190,13 +229,21 @@ mod tests {
     fn learning_curves_are_read_back() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(HISTORY);
-        let text = format!("{HEADER}0,1.5,0.25,1e-7,1e-4,2.0,0.000,0\n5,,0.125,1e-7,1e-4,2.0,0.100,2\n9,0.5,0.");
+        let text = format!("{HEADER}\n0,1.5,0.25,1e-7,1e-4,2.0,0.000,0\n5,,0.125,1e-7,1e-4,2.0,0.100,2\n9,0.5,0.");
         std::fs::write(&path, text).unwrap();
         let rows = [
-            Row { epoch: 0, nll: Some(1.5), mse: 0.25, recoveries: 0 },
-            Row { epoch: 5, nll: None, mse: 0.125, recoveries: 2 },
+            Row { epoch: 0, nll: Some(1.5), mse: 0.25, recoveries: 0, held_out: None },
+            Row { epoch: 5, nll: None, mse: 0.125, recoveries: 2, held_out: None },
         ];
         assert_eq!(read(&path).unwrap(), rows);
+        let text = format!(
+            "{}0,1.5,0.25,1,1,2.0,0.0,0{}\n5,1.5,0.25,1,1,2.0,0.0,0,-0.5,0.1,1,,,2,,\n",
+            header(true),
+            ",".repeat(8)
+        );
+        std::fs::write(&path, text).unwrap();
+        let held_out: Vec<Option<f64>> = read(&path).unwrap().iter().map(|row| row.held_out).collect();
+        assert_eq!(held_out, [None, Some(-0.5)]);
         // A file of an earlier version.
         std::fs::write(
             &path,
@@ -215,7 +262,7 @@ mod tests {
             let last = epochs.last().map(|&epoch| (epoch, epoch as f64 + 0.25));
             Cut { kept: rows(epochs), last, damaged }
         };
-        let text = format!("{HEADER}{}", rows(&[0, 10, 20]));
+        let text = format!("{HEADER}\n{}", rows(&[0, 10, 20]));
         assert_eq!(found(&text, 10), of(&[0, 10], None));
         assert_eq!(found(&text[..text.len() - 3], 100), of(&[0, 10], None));
         assert_eq!(found("", 100), Cut::default());

@@ -16,6 +16,11 @@
 //! | [`familiar`] | new data beside the range of what was learned |
 //! | [`conversion`] | data from one kind of file to another |
 //! | [`likeness`] | which learned sequence a new one is like, where all share one initial state |
+//! | [`held_out`] | which sequences are not learned, and how a network does on them while it learns |
+//! | [`evaluation`] | how a network does on sequences that it did not learn, beside simple models |
+//! | [`completion`] | the rest of a sequence as a distribution |
+//! | [`members`] | a mixture of networks as one run |
+//! | [`variance_factor`] | predicted variances made as large as the errors on such sequences |
 //! | [`messages`], [`interrupt`] | how news and progress leave, and how a person's wish to stop comes in |
 //! | [`memory`] | what would not fit is refused before it is tried |
 //! | [`failure`] | what ends a request early, and with which exit code |
@@ -26,13 +31,17 @@ pub mod assessment;
 pub mod channel_scores;
 pub mod channels;
 pub mod character;
+pub mod completion;
 pub mod conversion;
+pub mod evaluation;
 pub mod experiment;
 pub mod failure;
 pub mod familiar;
+pub mod held_out;
 pub mod history;
 pub mod interrupt;
 pub mod likeness;
+pub mod members;
 pub mod memory;
 pub mod messages;
 pub mod notes;
@@ -45,6 +54,7 @@ pub mod stream;
 pub mod trained;
 pub mod training;
 pub mod truth;
+pub mod variance_factor;
 pub mod verdict;
 
 mod recorder;

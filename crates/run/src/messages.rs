@@ -4,6 +4,8 @@ use std::fmt;
 
 use scrnn::learning::EpochReport;
 
+use crate::held_out::Glance;
+
 /// Takes sentences for a person: warnings, and what is going on.
 pub trait Messages: Sync {
     /// Says one, which may have several lines.
@@ -14,6 +16,9 @@ pub trait Messages: Sync {
 pub trait Progress: fmt::Debug {
     /// An epoch is over.
     fn epoch(&mut self, report: &EpochReport);
+
+    /// The network was looked at on sequences that it does not learn. Comes before the epoch that it belongs to.
+    fn held_out(&mut self, _glance: &Glance) {}
 
     /// Something worth a sentence happened to this training.
     fn say(&self, message: &str);

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::experiment::Experiment;
+use crate::variance_factor::VarianceFactor;
 
 /// The notes of a checkpoint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -19,6 +20,9 @@ pub struct Notes {
     /// The best epoch up to this one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best: Option<Score>,
+    /// A factor on the predicted variances, if one was found after the training. Going on with the training drops it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub variance_factor: Option<VarianceFactor>,
 }
 
 /// What is known of the sequences.
@@ -31,6 +35,18 @@ pub struct DataNotes {
     /// The least and the greatest sample of each channel, in the data's units. Empty in checkpoints of earlier versions.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ranges: Vec<(f64, f64)>,
+    /// The sequences that were held out, if any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<HeldOutNotes>,
+}
+
+/// What is known of the sequences that were held out.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct HeldOutNotes {
+    /// Fingerprint of names, lengths and samples.
+    pub digest: String,
+    /// Their names.
+    pub names: Vec<String>,
 }
 
 /// How well the network of an epoch predicts the sequences that it learned.
@@ -43,12 +59,29 @@ pub struct Score {
     pub nll: Option<f64>,
     /// Mean squared error per step and channel, in scaled units.
     pub mse: f64,
+    /// The same on the sequences that were held out, if there are any and they were looked at in this epoch.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<HeldOutScore>,
+}
+
+/// How well the network of an epoch predicts the sequences that were held out, from the mean initial state.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct HeldOutScore {
+    /// Nats per step and channel, in scaled units; none without variance units.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nll: Option<f64>,
+    /// Mean squared error per step and channel, in scaled units.
+    pub mse: f64,
 }
 
 impl Score {
-    /// What learning makes small: the nll, or the squared error where there is no variance.
+    /// What tells the best epoch: the nll, or the squared error where there is no variance; of the sequences that were held out, where
+    /// they were looked at.
     pub fn value(self) -> f64 {
-        self.nll.unwrap_or(self.mse)
+        match self.held_out {
+            Some(HeldOutScore { nll, mse }) => nll.unwrap_or(mse),
+            None => self.nll.unwrap_or(self.mse),
+        }
     }
 }
 

@@ -6,15 +6,17 @@ use std::time::{Duration, Instant};
 use scrnn::checkpoint::{Checkpoint, OptimiserState};
 use scrnn::initial_states::InitialStates;
 use scrnn::learning::{EpochReport, Learner, Observer, Outcome, Recovery};
+use scrnn::network::Network;
 use scrnn::parameters::Parameters;
 use scrnn::scaling::Scaling;
 
 use crate::experiment::Experiment;
 use crate::failure::{Failure, Result};
+use crate::held_out::{Glance, Watch};
 use crate::history::History;
 use crate::interrupt::Interrupt;
 use crate::messages::{Messages, Progress};
-use crate::notes::{Notes, Score};
+use crate::notes::{HeldOutScore, Notes, Score};
 use crate::run_folder::{BEST, CHECKPOINT, RunFolder};
 use crate::trained::read_checkpoint;
 
@@ -50,6 +52,10 @@ pub struct Recorder<'a> {
     /// The best network so far, if it is known, and whether its file is yet to be written.
     best: Option<(Parameters, InitialStates)>,
     best_waits: bool,
+    /// Looks at the network on what is held out.
+    watch: Option<&'a Watch>,
+    /// Whether it was ended because nothing got better on what is held out.
+    out_of_patience: bool,
     /// Whether the training was just reset to its best network: that is worth a row of the history.
     recovered: bool,
     failure: Option<Failure>,
@@ -64,7 +70,7 @@ impl<'a> Recorder<'a> {
         history: History,
         (progress, messages): (Box<dyn Progress>, &'a dyn Messages),
         experiment: &Experiment,
-        interrupt: &'a Interrupt,
+        (interrupt, watch): (&'a Interrupt, Option<&'a Watch>),
     ) -> Self {
         let output = &experiment.output;
         Self {
@@ -84,6 +90,8 @@ impl<'a> Recorder<'a> {
             saved_epoch: None,
             best: None,
             best_waits: false,
+            watch,
+            out_of_patience: false,
             recovered: false,
             failure: None,
         }
@@ -154,6 +162,28 @@ impl<'a> Recorder<'a> {
         self.notes.best
     }
 
+    /// The best network so far, as it learned in `learner`.
+    ///
+    /// # Errors
+    /// None for networks of one training.
+    pub fn best_network(&self, learner: &Learner) -> Result<Option<(Network, InitialStates)>> {
+        let Some((parameters, states)) = &self.best else { return Ok(None) };
+        Ok(Some((Network::new(learner.network().topology().clone(), parameters.clone())?, states.clone())))
+    }
+
+    /// Whether the training was ended because nothing got better on what is held out.
+    pub fn out_of_patience(&self) -> bool {
+        self.out_of_patience
+    }
+
+    /// A look at what is held out, if this epoch is one for it.
+    fn glance(&self, learner: &Learner, last: bool) -> Result<Option<Glance>> {
+        match self.watch.filter(|watch| watch.is_due(learner.epoch(), last)) {
+            Some(watch) => Ok(Some(watch.look(learner.network(), learner.initial_states())?)),
+            None => Ok(None),
+        }
+    }
+
     /// Seconds of training, those of earlier processes included.
     pub fn seconds(&self) -> f64 {
         self.history.seconds_before() + self.begun.elapsed().as_secs_f64()
@@ -209,16 +239,34 @@ impl<'a> Recorder<'a> {
 
 impl Observer for Recorder<'_> {
     fn epoch(&mut self, report: &EpochReport, learner: &Learner) -> ControlFlow<()> {
-        let score = Score { epoch: report.epoch, nll: report.nll, mse: report.mse };
-        self.notes.score = Some(score);
-        self.compare(score, learner);
         let last = report.epoch >= self.epochs;
+        let glance = match self.glance(learner, last) {
+            Ok(glance) => glance,
+            Err(failure) => {
+                self.failure = Some(failure);
+                return ControlFlow::Break(());
+            }
+        };
+        let held_out = glance.as_ref().map(Glance::score);
+        let score = Score { epoch: report.epoch, nll: report.nll, mse: report.mse, held_out };
+        self.notes.score = Some(score);
+        // What left the finite numbers on new sequences is not the best.
+        let comparable = |one: HeldOutScore| one.nll.is_some() == report.nll.is_some() && one.mse.is_finite();
+        if self.watch.is_none() || held_out.is_some_and(comparable) {
+            self.compare(score, learner);
+        }
         let recovered = std::mem::take(&mut self.recovered);
-        if last || recovered || report.epoch.is_multiple_of(self.history_every) {
-            self.history.row(report, self.begun.elapsed().as_secs_f64());
+        if last || recovered || glance.is_some() || report.epoch.is_multiple_of(self.history_every) {
+            self.history.row(report, self.begun.elapsed().as_secs_f64(), glance.as_ref());
+        }
+        if let Some(glance) = &glance {
+            self.progress.held_out(glance);
         }
         self.progress.epoch(report);
-        let stop = self.interrupt.asked() && !last;
+        let best = self.notes.best.map(|best| best.epoch);
+        self.out_of_patience =
+            !last && glance.is_some() && self.watch.is_some_and(|watch| watch.is_enough(report.epoch, best));
+        let stop = (self.interrupt.asked() || self.out_of_patience) && !last;
         if (last || stop || self.is_time_to_save(report.epoch))
             && let Err(failure) = self.save(learner)
         {

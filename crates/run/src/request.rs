@@ -6,6 +6,7 @@ use scrnn_data::format::Format;
 
 use crate::experiment::{self, Comment, Data, Experiment, Override, ScalingChoice};
 use crate::failure::{Failure, Result};
+use crate::members;
 use crate::recipe::{self, Recipe};
 use crate::run_folder::{CHECKPOINT, EXPERIMENT};
 use crate::source::{self, Source};
@@ -153,7 +154,8 @@ fn alone(files: &[PathBuf], overrides: &[Override], out: Option<&Path>, resume: 
     let name = name_for(files);
     let listed: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
     let begun = out.map_or_else(|| Path::new("runs").join(&name), Path::to_owned);
-    if resume && begun.join(CHECKPOINT).exists() && begun.join(EXPERIMENT).exists() {
+    let is_run = begun.join(CHECKPOINT).exists() || !members::folders(&begun).is_empty();
+    if resume && is_run && begun.join(EXPERIMENT).exists() {
         let mut all = vec![self::files(files)?];
         all.extend_from_slice(overrides);
         let experiment = experiment::read(&begun.join(EXPERIMENT), &all)?.resolved(&begun)?;

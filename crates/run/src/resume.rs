@@ -28,7 +28,14 @@ pub fn check(checkpoint: &Checkpoint, now: Notes, experiment: &Experiment, path:
     }
     let mut changes = differences(&then.experiment, &now.experiment);
     // Samples are compared, not where they lie.
-    changes.retain(|change| change.key != "data.files");
+    changes.retain(|change| change.key != "data.files" && change.key != "data.held_out.files");
+    // It says when a training ends, not how it goes. A shorter one might have ended it before.
+    let more = |change: &Difference| match (&change.old, &change.new) {
+        (_, None) => true,
+        (Some(old), Some(new)) => new.as_u64() >= old.as_u64(),
+        (None, Some(_)) => false,
+    };
+    changes.retain(|change| change.key != "training.patience" || !more(change));
     // A run of a version that never reset a training gives the same result as long as no reset was needed.
     changes.retain(|change| change.key != "training.on_divergence" || change.old.is_some());
     let by_lbfgs = experiment.training.lbfgs.is_some();
@@ -60,6 +67,10 @@ pub fn check(checkpoint: &Checkpoint, now: Notes, experiment: &Experiment, path:
             };
             let (old, new) = (list(&then.data.lengths), list(&now.data.lengths));
             message += &format!("\n  samples in each sequence: {old} -> {new}");
+        }
+        let names = |notes: &Notes| notes.data.held_out.as_ref().map_or(Vec::new(), |held_out| held_out.names.clone());
+        if names(&then) != names(&now) {
+            message += &format!("\n  held out: {} -> {}", names(&then).join(", "), names(&now).join(", "));
         }
         let short = |digest: &str| digest.chars().take(12).collect::<String>();
         message += &format!("\n  digest: {} -> {}", short(&then.data.digest), short(&now.data.digest));

@@ -4,8 +4,9 @@ use scrnn::dataset::{Dataset, Sequence};
 use scrnn_sim::tutor::{self, Demonstration, Tutoring};
 use sha2::{Digest, Sha256};
 
-use crate::experiment::Data;
+use crate::experiment::{Data, Experiment};
 use crate::failure::{Failure, Result};
+use crate::held_out;
 use scrnn_data::{Reading, Remark, read_all, suspicions};
 use scrnn_tasks::{Task, TaskName, make};
 
@@ -14,6 +15,8 @@ use scrnn_tasks::{Task, TaskName, make};
 pub struct Source {
     /// What is learned.
     pub data: Dataset,
+    /// What is held out of the training, on the same channels.
+    pub held_out: Option<Dataset>,
     /// The variance of each sample's noise, where it is known.
     pub truth: Option<Truth>,
     /// Seconds between two samples, where that is known.
@@ -26,7 +29,7 @@ pub struct Source {
 
 impl Source {
     fn of(data: Dataset) -> Self {
-        Self { data, truth: None, period: None, remarks: Vec::new(), demonstrations: Vec::new() }
+        Self { data, held_out: None, truth: None, period: None, remarks: Vec::new(), demonstrations: Vec::new() }
     }
 }
 
@@ -39,7 +42,15 @@ pub struct Truth {
     pub variances: Dataset,
 }
 
-/// Makes or reads the sequences of a resolved experiment. Simulated robots use so many threads, which change no bit.
+/// Makes or reads the sequences of a resolved experiment, and takes those out that are not to be learned.
+///
+/// # Errors
+/// As [`load`]; [`Failure::Input`] where the data have no such sequences, or nothing would be left to learn.
+pub fn of(experiment: &Experiment, threads: usize) -> Result<Source> {
+    held_out::split(load(&experiment.data, threads)?, experiment)
+}
+
+/// Makes or reads all sequences of a resolved experiment. Simulated robots use so many threads, which change no bit.
 ///
 /// # Errors
 /// What is wrong with task or files.

@@ -7,12 +7,14 @@ use scrnn::dataset::Dataset;
 use scrnn::network::Network;
 
 use crate::channels;
+use crate::experiment::{Evaluation, Experiment};
 use crate::failure::{Failure, Result};
 use crate::familiar;
+use crate::members;
 use crate::messages::Messages;
 use crate::notes::Notes;
 use crate::run_folder::{BEST, CHECKPOINT};
-use crate::source;
+use crate::source::{self, Source};
 use scrnn_data::Selection;
 
 /// Scaled samples from here on are refused: predictions lie between -1 and 1.
@@ -36,6 +38,14 @@ impl Trained {
         let file = if path.is_dir() {
             let name = if best { BEST } else { CHECKPOINT };
             let file = path.join(name);
+            let members = members::folders(path).len();
+            if members > 0 {
+                let message = format!("{} holds a mixture of {members} networks", path.display());
+                return Err(Failure::input(
+                    message,
+                    format!("give one of them: {}", members::folder(path, 1).display()),
+                ));
+            }
             if !file.exists() {
                 let message = format!("{} holds no {name}", path.display());
                 return Err(Failure::input(message, "give the folder that `scrnn train` wrote, or a checkpoint file"));
@@ -50,11 +60,20 @@ impl Trained {
         };
         let checkpoint = read_checkpoint(&file)?;
         let notes = Notes::of(&checkpoint);
-        let network = Network::new(checkpoint.topology.clone(), checkpoint.parameters.clone())?;
+        let mut network = Network::new(checkpoint.topology.clone(), checkpoint.parameters.clone())?;
+        if let Some(factor) = notes.as_ref().and_then(|notes| notes.variance_factor.as_ref()) {
+            factor.apply(&mut network)?;
+        }
         Ok(Self { path: file, checkpoint, notes, network })
     }
 
-    /// The network itself.
+    /// What is to be said of its variances, if they are not as they were learned.
+    pub fn remark(&self) -> Option<String> {
+        let factor = self.notes.as_ref()?.variance_factor.as_ref()?;
+        Some(factor.in_words(&self.checkpoint.channels))
+    }
+
+    /// The network itself, with the factor on its variances if one was found.
     pub fn network(&self) -> Network {
         self.network.clone()
     }
@@ -86,8 +105,25 @@ impl Trained {
         Some(self.notes.as_ref()?.experiment().ok()?.data.selection())
     }
 
+    /// How its experiment judges networks on what it holds out, or how that is done by default.
+    pub fn evaluation(&self) -> Evaluation {
+        let experiment = self.notes.as_ref().and_then(|notes| Experiment::deserialize(&notes.experiment).ok());
+        experiment.and_then(|experiment| experiment.evaluation).unwrap_or_default()
+    }
+
+    /// sigma^2_IS of its training, or 1 where that is not known.
+    pub fn initial_state_variance(&self) -> f64 {
+        let notes = self.notes.as_ref();
+        notes.and_then(|notes| notes.experiment["network"]["initial_state_variance"].as_f64()).unwrap_or(1.0)
+    }
+
     /// The sequences that it learned, made (by simulated robots: on so many threads) or read again.
     pub fn learned_data(&self, threads: usize) -> Result<Dataset> {
+        Ok(self.source(threads)?.data)
+    }
+
+    /// The sequences that it learned, with those that were held out of the training, made or read again.
+    pub fn source(&self, threads: usize) -> Result<Source> {
         let other = "say with --data which sequences to use";
         let notes = self.notes.as_ref().ok_or_else(|| {
             Failure::input(format!("{} does not say what it was trained on", self.path.display()), other)
@@ -95,11 +131,13 @@ impl Trained {
         let experiment = notes.experiment().map_err(|error| {
             Failure::input(format!("the experiment in {} cannot be read: {error}", self.path.display()), other)
         })?;
-        let data = source::load(&experiment.data, threads)?.data;
-        if source::digest(&data) != notes.data.digest {
+        let source = source::of(&experiment, threads)?;
+        let held_out = notes.data.held_out.as_ref().map(|notes| notes.digest.clone());
+        if source::digest(&source.data) != notes.data.digest || source.held_out.as_ref().map(source::digest) != held_out
+        {
             return Err(Failure::input("the data changed since the network learned them", other));
         }
-        Ok(data)
+        Ok(source)
     }
 
     /// `data`, from the file at `path`, on the channels that were learned and in their order (see [`channels::matched`]),

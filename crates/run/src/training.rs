@@ -4,8 +4,10 @@ use std::path::Path;
 
 use scrnn::dataset::Dataset;
 use scrnn::engine::Engine;
+use scrnn::initial_states::InitialStates;
 use scrnn::initialization::initialize;
 use scrnn::learning::{Learner, Outcome};
+use scrnn::network::Network;
 use scrnn::scaling::Scaling;
 use scrnn::topology::Topology;
 use scrnn_data::Level;
@@ -13,6 +15,7 @@ use scrnn_data::Level;
 use crate::experiment::{self, Experiment, ScalingChoice, ScalingName};
 use crate::failure::{Failure, Result};
 use crate::familiar::ranges;
+use crate::held_out::{self, Watch};
 use crate::history::History;
 use crate::interrupt::Interrupt;
 use crate::messages::{Messages, Progress};
@@ -47,6 +50,14 @@ pub struct Training {
     pub source: Source,
     /// Between the data's units and the network's.
     pub scaling: Scaling,
+    /// Whether it ended before its last epoch because nothing got better on the sequences that are held out.
+    pub out_of_patience: bool,
+    /// Looks at networks on what is held out, if anything is.
+    pub watch: Option<Watch>,
+    /// The best network with its initial states, where it is known.
+    pub best_network: Option<(Network, InitialStates)>,
+    /// The variance of the prior over initial states.
+    pub initial_state_variance: f64,
     /// How the network does, if its last epoch was evaluated.
     pub score: Option<Score>,
     /// The best epoch.
@@ -82,6 +93,7 @@ pub fn train_on(
     progress: Box<dyn Progress>,
     messages: &dyn Messages,
 ) -> Result<Training> {
+    let source = held_out::split(source, experiment)?;
     if experiment.data.files.is_some() {
         introduce(experiment, &source, messages);
     }
@@ -97,6 +109,7 @@ pub fn train_on(
     if !topology.has_linear_mean() && topology.skip().is_none() {
         warn_out_of_reach(experiment, &scaled, messages);
     }
+    let watch = Watch::new(experiment, (&source, &scaling, &scaled), topology.delay(), engine)?;
 
     let (network, initial_states) = initialize(&topology, scaled.sequences().len(), experiment.seed);
     let mut learner = Learner::new(network, initial_states, &scaled, experiment.plan(), engine)?;
@@ -106,9 +119,11 @@ pub fn train_on(
             digest: source::digest(&source.data),
             lengths: source.data.sequences().iter().map(|sequence| sequence.len()).collect(),
             ranges: ranges(&source.data).into_iter().map(Option::unwrap_or_default).collect(),
+            held_out: held_out::notes(&source),
         },
         score: None,
         best: None,
+        variance_factor: None,
     };
 
     refuse_own_input(experiment, path)?;
@@ -126,14 +141,14 @@ pub fn train_on(
         learner = Learner::resume(&checkpoint, &scaled, experiment.plan(), engine)?;
         messages.say(&format!("going on with {} at epoch {}", path.display(), learner.epoch()));
         keep_experiment(&run, experiment)?;
-        (notes, History::go_on(&run, learner.epoch(), messages)?)
+        (notes, History::go_on(&run, (learner.epoch(), watch.is_some()), messages)?)
     } else {
         // In this order: a kill in between leaves a folder without a run rather than parts of two.
         for name in [CHECKPOINT, BEST, HISTORY] {
             run.remove(name)?;
         }
         write_experiment(&run, experiment)?;
-        (notes, History::start(&run)?)
+        (notes, History::start(&run, watch.is_some())?)
     };
     let record = Record {
         scaling: scaling.clone(),
@@ -142,7 +157,8 @@ pub fn train_on(
         first_inputs: first_inputs(&scaled, topology.delay()),
     };
 
-    let mut recorder = Recorder::new(&run, record, notes, history, (progress, messages), experiment, interrupt);
+    let observed = (interrupt, watch.as_ref());
+    let mut recorder = Recorder::new(&run, record, notes, history, (progress, messages), experiment, observed);
     if found && wanted == Found::GoOn {
         recorder.take_up_best(&learner);
     } else {
@@ -151,8 +167,24 @@ pub fn train_on(
     let outcome = learner.run(&mut recorder);
     recorder.finish(&learner, &outcome)?;
     let (score, best, seconds) = (recorder.score_of(learner.epoch()), recorder.best(), recorder.seconds());
+    let (best_network, out_of_patience) = (recorder.best_network(&learner)?, recorder.out_of_patience());
+    drop(recorder);
     let run = run.path().display().to_string();
-    Ok(Training { run, outcome, learner, source, scaling, score, best, seconds })
+    let initial_state_variance = experiment.network.initial_state_variance;
+    Ok(Training {
+        run,
+        outcome,
+        learner,
+        source,
+        scaling,
+        out_of_patience,
+        watch,
+        best_network,
+        initial_state_variance,
+        score,
+        best,
+        seconds,
+    })
 }
 
 /// Refuses to write a run's files over the data that it learns.
@@ -186,6 +218,11 @@ fn introduce(experiment: &Experiment, source: &Source, messages: &dyn Messages) 
     let names = files.iter().map(|file| file.file_name().unwrap_or_default().to_string_lossy().into_owned());
     let names = names.collect::<Vec<_>>().join(", ");
     messages.say(&format!("{line}, channels: {} (from {names})", data.channels().join(", ")));
+    if let Some(held_out) = &source.held_out {
+        let names: Vec<&str> = held_out.sequences().iter().map(|sequence| sequence.name.as_str()).take(20).collect();
+        let more = if held_out.sequences().len() > names.len() { ", ..." } else { "" };
+        messages.say(&format!("holds {} out to judge by: {}{more}", held_out.sequences().len(), names.join(", ")));
+    }
     for remark in &source.remarks {
         let kind = if remark.level() == Level::Warning { "warning" } else { "note" };
         let help = remark.help().map_or(String::new(), |help| format!(" ({help})"));
@@ -238,7 +275,8 @@ fn refuse_unbounded(data: &Dataset, topology: &Topology) -> Result<()> {
     ))
 }
 
-fn write_experiment(run: &RunFolder, experiment: &Experiment) -> Result<()> {
+/// Writes the resolved experiment into its run folder.
+pub(crate) fn write_experiment(run: &RunFolder, experiment: &Experiment) -> Result<()> {
     let head = match experiment.comments.is_empty() {
         true => "# Written by scrnn train: the experiment with every value explicit.\n",
         false => {

@@ -10,7 +10,9 @@ use serde::Serialize;
 
 use crate::assessment;
 use crate::channel_scores::{ChannelScore, channel_scores};
+use crate::evaluation::Member;
 use crate::failure::Result;
+use crate::held_out::Judgement;
 use crate::notes::Score;
 use crate::training::{Training, still_channels};
 use crate::truth::{self, Comparison};
@@ -28,6 +30,8 @@ pub struct Verdict {
     best: Option<Score>,
     /// How each channel is predicted one step ahead.
     channels: Vec<ChannelScore>,
+    /// How the best network does on the sequences that were held out.
+    held_out: Option<Judgement>,
     truth: Option<Comparison>,
     divergence: Option<Place>,
     /// Channels that never change in the samples that are predicted, where the variance is predicted.
@@ -61,7 +65,7 @@ struct Place {
 impl Verdict {
     /// Judges the network that the training ended with.
     pub fn new(training: &Training, engine: &Engine) -> Result<Self> {
-        let Training { run, outcome, learner, source, scaling, score, best, seconds } = training;
+        let Training { run, outcome, learner, source, scaling, score, best, seconds, .. } = training;
         let topology = &learner.network().topology();
         let truth = match (outcome, &source.truth) {
             (Outcome::Finished, Some(truth)) if topology.has_variance() => {
@@ -75,6 +79,7 @@ impl Verdict {
         Ok(Self {
             run: run.clone(),
             outcome: match outcome {
+                Outcome::Stopped if training.out_of_patience => "out of patience",
                 Outcome::Finished => "finished",
                 Outcome::Stopped => "interrupted",
                 Outcome::Diverged(_) => "diverged",
@@ -85,6 +90,7 @@ impl Verdict {
             constant_model: ConstantModel::of(&scaled, topology.delay())?,
             best: *best,
             channels: channel_scores(&scaled, &open, topology.delay(), scaling),
+            held_out: judgement(training)?,
             truth,
             divergence: match outcome {
                 Outcome::Diverged(divergence) => Some(Place::of(divergence)),
@@ -125,6 +131,17 @@ impl Verdict {
             None | Some(0) => Ok(()),
             Some(more) => writeln!(f, "  and {more} more: --json has all"),
         }
+    }
+}
+
+/// How the best network does on what was held out; none while a person waits for an interrupted training to end.
+fn judgement(training: &Training) -> Result<Option<Judgement>> {
+    let ended = !matches!(training.outcome, Outcome::Stopped) || training.out_of_patience;
+    match (&training.watch, &training.best_network, training.best) {
+        (Some(watch), Some((network, states)), Some(best)) if ended => {
+            Ok(Some(watch.judge(&[Member { network, states }], best.epoch, training.initial_state_variance)?))
+        }
+        _ => Ok(None),
     }
 }
 
@@ -193,6 +210,12 @@ impl fmt::Display for Verdict {
                  the rate is too large for these data (history.csv has the epochs).",
                 self.recoveries
             )?;
+        }
+        if let Some(held_out) = &self.held_out {
+            write!(f, "{held_out}")?;
+            if held_out.epoch != self.epoch {
+                writeln!(f, "The best network is in best.safetensors: give --best to the commands that use the run.")?;
+            }
         }
         for channel in &self.still_channels {
             writeln!(f, "Channel {channel} never changes: its predicted variance falls to the variance_floor.")?;

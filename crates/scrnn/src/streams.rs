@@ -50,7 +50,8 @@ pub enum Purpose {
     TrialPlaces = 14,
     /// What a controller that stands in for a network draws; index: the trial.
     StandIn = 15,
-    /// A seed for data that are made anew to judge what was learned; index: the set.
+    /// What is kept out of a training to judge it: which sequences of the data (index 0), or a seed for data that are made anew
+    /// (index: the set, from 1).
     HeldOut = 16,
     /// A seed for closed loops that a study generates; index: the loop's kind.
     StudyLoops = 17,

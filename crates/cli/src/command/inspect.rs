@@ -5,13 +5,14 @@ use std::path::PathBuf;
 use clap::Args;
 use scrnn_pages::data_page::data_page;
 use scrnn_pages::inspection::{network_object, network_text, reading_object, reading_text};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::args::{Part, Shared};
 use crate::output;
 use crate::outputs::check_distinct;
 use scrnn_data::{self as files, Remark};
 use scrnn_run::failure::{Ending, Failure, Result};
+use scrnn_run::members;
 use scrnn_run::run_folder::CHECKPOINT;
 use scrnn_run::trained::Trained;
 
@@ -42,13 +43,19 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     let is_checkpoint = path.extension().is_some_and(|extension| extension == "safetensors");
     let is_run = path.is_dir() && path.join(CHECKPOINT).exists();
     check_distinct(&[("--plot", arguments.plot.as_deref())], &[("PATH", Some(path))])?;
-    let (object, text) = if is_run || is_checkpoint {
-        if arguments.plot.is_some() {
-            return Err(Failure::input(
-                "--plot draws data, and this is a network",
-                "`scrnn report` makes a page of a run",
-            ));
-        }
+    let members = if path.is_dir() { members::folders(path) } else { Vec::new() };
+    let is_network = is_run || is_checkpoint || !members.is_empty();
+    if is_network && arguments.plot.is_some() {
+        let help = "`scrnn report` makes a page of a run";
+        return Err(Failure::input("--plot draws data, and this is a network", help));
+    }
+    let (object, text) = if !members.is_empty() {
+        let all = members::open(path, false)?;
+        let objects: Vec<Value> = all.iter().map(network_object).collect();
+        let texts = all.iter().zip(&members).map(|(trained, folder)| network_text(trained, folder));
+        let head = format!("{}: a mixture of {} networks\n", path.display(), all.len());
+        (json!({ "kind": "mixture", "members": objects }), head + &texts.collect::<String>())
+    } else if is_network {
         let trained = Trained::open(path, false)?;
         (network_object(&trained), network_text(&trained, path))
     } else {

@@ -3,6 +3,7 @@
 pub mod completions;
 pub mod convert;
 pub mod data;
+pub mod evaluate;
 pub mod generate;
 pub mod inspect;
 pub mod recognize;

@@ -3,10 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use scrnn_pages::mixture_page::page as mixture_page;
 use scrnn_pages::run_page::page;
-use scrnn_report::PAGE;
+use scrnn_report::{PAGE, Page};
 use scrnn_run::failure::{Ending, Failure, Result};
 use scrnn_run::history;
+use scrnn_run::members;
 use scrnn_run::run_folder::HISTORY;
 use scrnn_run::trained::Trained;
 
@@ -42,13 +44,27 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         let message = format!("{} is not a run folder", arguments.run.display());
         return Err(Failure::input(message, "give the folder that `scrnn train` wrote"));
     }
-    let trained = Trained::open(&arguments.run, arguments.best)?;
     let engine = shared.engine()?;
-    let data = trained.learned_data(engine.threads())?;
+    let folders = members::folders(&arguments.run);
+    if !folders.is_empty() {
+        let all = members::open(&arguments.run, arguments.best)?;
+        all.iter().for_each(|trained| shared.say_of(trained));
+        let mut rows = Vec::new();
+        for folder in &folders {
+            rows.push(history::read(&folder.join(HISTORY))?);
+        }
+        return finish(arguments, &mixture_page(&all, &rows, &engine)?);
+    }
+    let trained = Trained::open(&arguments.run, arguments.best)?;
+    shared.say_of(&trained);
+    let source = trained.source(engine.threads())?;
     let rows = history::read(&arguments.run.join(HISTORY))?;
-    let page = page(&trained, &data, &rows, arguments.seed, &engine)?;
+    finish(arguments, &page(&trained, &source, &rows, arguments.seed, &engine)?)
+}
+
+fn finish(arguments: &Arguments, page: &Page) -> Result<Ending> {
     let out = arguments.out.as_ref().unwrap_or(&arguments.run);
-    scrnn_pages::write(&page, out)?;
+    scrnn_pages::write(page, out)?;
     output::print(&format!("{}\n", out.join(PAGE).display()))?;
     Ok(Ending::Done)
 }

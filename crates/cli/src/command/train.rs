@@ -3,14 +3,17 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use scrnn::engine::Engine;
 use scrnn::learning::Outcome;
 
 use crate::args::{MOST_IN_TOML, Part, Shared, whole};
 use crate::output;
 use crate::progress::Bars;
 use crate::signals::Signals;
-use scrnn_run::experiment::Override;
+use scrnn_run::experiment::{Experiment, Override};
 use scrnn_run::failure::{Ending, Failure, Result};
+use scrnn_run::interrupt::Interrupt;
+use scrnn_run::members::{self, train_members};
 use scrnn_run::request::{self, Asked, Request};
 use scrnn_run::run_folder::{BEST, CHECKPOINT};
 use scrnn_run::source;
@@ -91,9 +94,9 @@ pub fn run(arguments: &Arguments, (shared, signals): (&Shared, &Signals)) -> Res
 
     let engine = shared.engine()?;
     let interrupt = signals.listen();
-    let progress = Bars::new(shared.quiet).bar("", experiment.training.epochs);
+    let mixture = experiment.training.members.is_some_and(|members| members > 1);
     let found = if arguments.resume {
-        if !path.join(CHECKPOINT).exists() {
+        if !path.join(CHECKPOINT).exists() && members::folders(&path).is_empty() {
             shared.say(format_args!("{} holds no checkpoint: starting from epoch 0", path.display()));
         }
         Found::GoOn
@@ -102,10 +105,18 @@ pub fn run(arguments: &Arguments, (shared, signals): (&Shared, &Signals)) -> Res
     } else {
         Found::Refuse
     };
+    if mixture {
+        return train_mixture(&experiment, (&path, found), (shared, &engine, &interrupt), arguments.json);
+    }
+    if !members::folders(&path).is_empty() {
+        let message = format!("{} holds a mixture of networks", path.display());
+        return Err(Failure::refused(message, "--out RUN writes elsewhere; or set training.members"));
+    }
     let source = match source {
         Some(source) => source,
         None => source::load(&experiment.data, engine.threads())?,
     };
+    let progress = Bars::new(shared.quiet).bar("", experiment.training.epochs);
     let training = train_on(&experiment, source, (&path, found), (&engine, &interrupt), progress, shared)?;
     let verdict = Verdict::new(&training, &engine)?;
     if arguments.json {
@@ -116,11 +127,35 @@ pub fn run(arguments: &Arguments, (shared, signals): (&Shared, &Signals)) -> Res
     Ok(ending(&training, &path, shared))
 }
 
+/// Trains the members of a mixture side by side.
+fn train_mixture(
+    experiment: &Experiment,
+    (path, found): (&Path, Found),
+    (shared, engine, interrupt): (&Shared, &Engine, &Interrupt),
+    json: bool,
+) -> Result<Ending> {
+    let bars = Bars::new(shared.quiet);
+    let progress = |label: &str, epochs: u64| bars.bar(label, epochs);
+    let machine = (engine.threads(), engine.instruction_set(), interrupt);
+    let verdict = train_members(experiment, (path, found), machine, &progress, shared)?;
+    match json {
+        true => output::print_json(&verdict)?,
+        false => output::print(&verdict.to_string())?,
+    }
+    if verdict.interrupted() {
+        let folder = path.display();
+        shared.say(format_args!("interrupted; all members are saved. To go on:\n  scrnn train {folder} --resume"));
+        return Ok(Ending::Interrupted);
+    }
+    Ok(if verdict.diverged() { Ending::Diverged } else { Ending::Done })
+}
+
 /// Tells what to do about an end before the last epoch.
 fn ending(training: &Training, path: &Path, shared: &Shared) -> Ending {
     let folder = path.display();
     match &training.outcome {
         Outcome::Finished => Ending::Done,
+        Outcome::Stopped if training.out_of_patience => Ending::Done,
         Outcome::Stopped => {
             shared.say(format_args!(
                 "interrupted: epoch {} is saved. To go on:\n  scrnn train {folder} --resume",

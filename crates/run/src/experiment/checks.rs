@@ -1,10 +1,11 @@
 //! What the types of the experiment file cannot rule out. A complaint names its key, so that the reader can point at it.
 
+use crate::members::MOST as MOST_MEMBERS;
 use crate::memory::{complaint as complaint_about, product};
 
 use super::{
-    Adam, ClosedLoop, Data, Experiment, Lbfgs, Momentum, Network, OptimiserName, Output, ScalingChoice, SkipName,
-    TaskName, Training,
+    Adam, ClosedLoop, Data, Experiment, HeldOut, HeldOutDrawn, HeldOutFiles, Lbfgs, Momentum, Network, OptimiserName,
+    Output, ScalingChoice, SkipName, TaskName, Training,
 };
 
 /// Most sequences and steps that a task is asked for, most units of a group, and the longest delay.
@@ -68,6 +69,10 @@ pub fn check(experiment: &Experiment) -> Check {
         must(closed_loop.is_none(), &path, "given with momentum", "optimiser = \"adam\"")?;
     }
     of_library(lbfgs.as_ref().map_or(Ok(()), Lbfgs::check))?;
+    check_held_out(experiment)?;
+    if let Some(members) = experiment.training.members {
+        must((1..=MOST_MEMBERS).contains(&members), &["training", "members"], members, "1 to 100 networks")?;
+    }
     check_output(&experiment.output)
 }
 
@@ -165,6 +170,43 @@ fn check_data(data: &Data) -> Check {
             must(scaling.offset.iter().all(|value| value.is_finite()), &path, "not usable", "offsets that are finite")?;
         }
         Some(ScalingChoice::Named(_)) | None => {}
+    }
+    Ok(())
+}
+
+fn check_held_out(experiment: &Experiment) -> Check {
+    let path = ["data", "held_out"];
+    match &experiment.data.held_out {
+        Some(HeldOut::Share(share) | HeldOut::Drawn(HeldOutDrawn { share, .. })) => {
+            must(*share > 0.0 && *share < 1.0, &path, share, "a share above 0 and below 1, as 0.2")?;
+        }
+        Some(HeldOut::Names(names)) => must(!names.is_empty(), &path, "empty", "at least one name")?,
+        Some(HeldOut::Files(HeldOutFiles { files })) => {
+            must(!files.is_empty(), &path, "without a file", "at least one file")?;
+            if experiment.data.task.is_some() {
+                return complaint(&path, "files are held out of a `task`", "a share, as held_out = 0.2");
+            }
+        }
+        None => {
+            let without = "needs sequences that are held out";
+            if experiment.training.patience.is_some() {
+                let message = format!("`training.patience` {without}");
+                return complaint(&["training", "patience"], message, "held_out = 0.2 in [data], or leave it out");
+            }
+            if experiment.evaluation.is_some() {
+                let message = format!("`evaluation` {without}");
+                return complaint(&["evaluation"], message, "held_out = 0.2 in [data], or leave it out");
+            }
+        }
+    }
+    must(experiment.training.patience != Some(0), &["training", "patience"], 0, "at least 1 evaluation")?;
+    if let Some(evaluation) = &experiment.evaluation {
+        must(evaluation.every != Some(0), &["evaluation", "every"], 0, "at least 1 epoch")?;
+        let share = |key, value: f64| {
+            must((0.0..1.0).contains(&value), &["evaluation", key], value, "a share from 0 to below 1")
+        };
+        share("burn_in", evaluation.burn_in)?;
+        share("observed", evaluation.observed)?;
     }
     Ok(())
 }

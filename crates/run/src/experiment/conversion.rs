@@ -9,8 +9,8 @@ use scrnn::scaling::Scaling;
 use scrnn::topology::{Prediction, Topology};
 
 use super::{
-    Data, Experiment, MeanUnits, MissingName, OptimiserName, ScalingChoice, ScalingConstants, ScalingName,
-    ScalingRanges, SkipName, TaskName, TimeSourceName, Training, checks, robust,
+    Data, Experiment, HeldOut, HeldOutFiles, MeanUnits, MissingName, OptimiserName, ScalingChoice, ScalingConstants,
+    ScalingName, ScalingRanges, SkipName, TaskName, TimeSourceName, Training, checks, robust,
 };
 use crate::failure::{Failure, Result};
 use scrnn_data::{Missing, Selection, TimeSource};
@@ -32,6 +32,10 @@ impl Experiment {
         }
         let a_thousandth = (self.training.epochs / 1000).max(1);
         self.output.history_every.get_or_insert(a_thousandth);
+        if self.data.held_out.is_some() {
+            let a_hundredth = (self.training.epochs / 100).max(1);
+            self.evaluation.get_or_insert_default().every.get_or_insert(a_hundredth);
+        }
         Ok(self)
     }
 
@@ -102,7 +106,11 @@ impl Data {
                 self.exact_positions.get_or_insert(false);
             }
         }
-        for file in self.files.iter_mut().flatten() {
+        let held_out = match &mut self.held_out {
+            Some(HeldOut::Files(HeldOutFiles { files })) => files.as_mut_slice(),
+            _ => &mut [],
+        };
+        for file in self.files.iter_mut().flatten().chain(held_out) {
             let path: PathBuf = folder.join(&*file);
             *file = std::path::absolute(&path).map_err(|error| Failure::disk("find", &path, error))?;
             if file.to_str().is_none() {

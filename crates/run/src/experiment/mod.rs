@@ -42,6 +42,9 @@ pub struct Experiment {
     pub network: Network,
     /// How the network learns.
     pub training: Training,
+    /// How it is judged on sequences that are held out of the training. Goes with `data.held_out`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub evaluation: Option<Evaluation>,
     /// What is written while it learns. Has no influence on what is learned.
     #[serde(default)]
     pub output: Output,
@@ -115,6 +118,65 @@ pub struct Data {
     /// "none" for other tasks.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scaling: Option<ScalingChoice>,
+    /// Whole sequences that are not learned: the network is judged on them while it learns, the best one is the best on them, and
+    /// the scaling does not know them. A share of all, drawn by the experiment's seed; or their names; or files of their own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<HeldOut>,
+}
+
+/// Which sequences are held out of the training.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(
+    untagged,
+    expecting = "held_out is a share as 0.2, a list of names of sequences, { share = 0.2, seed = 1 } or { files = [...] }"
+)]
+pub enum HeldOut {
+    /// This share of the sequences, at least one of them, drawn by the experiment's seed.
+    Share(f64),
+    /// The sequences of these names.
+    Names(Vec<String>),
+    /// A share, drawn by a seed of its own: the same sequences for any seed of the experiment.
+    Drawn(HeldOutDrawn),
+    /// The sequences of files that are read as `files` are.
+    Files(HeldOutFiles),
+}
+
+/// A share of the sequences, and the seed that draws them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HeldOutDrawn {
+    /// Above 0, below 1.
+    pub share: f64,
+    /// Draws them.
+    pub seed: u64,
+}
+
+/// Files with sequences that are not learned.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HeldOutFiles {
+    /// Files and folders, relative to the experiment file; `*` stands for any part of a name.
+    pub files: Vec<PathBuf>,
+}
+
+/// How a network is judged on sequences that it does not learn.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Evaluation {
+    /// Epochs between two evaluations. Default: a hundredth of all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub every: Option<u64>,
+    /// Share of each sequence at its beginning that the network listens to before its predictions count: it starts from the mean
+    /// initial state, and has yet to find out which movement this is.
+    pub burn_in: f64,
+    /// Share of each sequence that the network hears before it goes on alone, in its closed loop.
+    pub observed: f64,
+}
+
+impl Default for Evaluation {
+    fn default() -> Self {
+        Self { every: None, burn_in: 0.1, observed: 0.3 }
+    }
 }
 
 /// What tells when a sample was taken.
@@ -289,6 +351,13 @@ pub struct Training {
     /// What to do when training becomes unstable: a value is not finite, or the likelihood collapses.
     #[serde(default = "recover")]
     pub on_divergence: OnDivergence,
+    /// Ends the training once so many evaluations in a row brought no better nll on the held-out sequences. Default: never.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub patience: Option<u64>,
+    /// Trains so many networks side by side, from `seed` and those after it: a mixture, whose folders lie in the run folder.
+    /// Default: one network.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub members: Option<u64>,
     /// Options of "momentum".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub momentum: Option<Momentum>,

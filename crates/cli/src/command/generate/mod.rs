@@ -1,5 +1,6 @@
 //! `scrnn generate`: lets a trained network run (thesis 2.8).
 
+mod onward;
 mod starts;
 
 use std::path::PathBuf;
@@ -14,7 +15,9 @@ use crate::args::{Part, Shared};
 use crate::output;
 use crate::outputs::check_distinct;
 use scrnn_data::{self as files, Field};
+use scrnn_run::evaluation::Rest;
 use scrnn_run::failure::{Ending, Failure, Result};
+use scrnn_run::members;
 use scrnn_run::trained::Trained;
 use starts::Row;
 
@@ -34,7 +37,9 @@ Examples:
   Ten runs of the third one, 500 steps each:
     scrnn generate runs/lissajous --sequence 3 --samples 10 --steps 500 --seed 7
   One step ahead of recorded samples, from the states that `scrnn recognize --out` found:
-    scrnn generate runs/lissajous --mode open --data new.csv --initial-state states.npz")]
+    scrnn generate runs/lissajous --mode open --data new.csv --initial-state states.npz
+  How recorded sequences go on after their first 30 samples, as a distribution:
+    scrnn generate runs/lissajous --from new.csv --observed 30 --samples 50 --out rest.npz")]
 pub struct Arguments {
     /// A run folder or a checkpoint file
     run: PathBuf,
@@ -56,6 +61,13 @@ pub struct Arguments {
     /// Start from the initial states in FILE: each row is one, with a column for each context unit
     #[arg(long, value_name = "FILE")]
     initial_state: Option<PathBuf>,
+    /// Go on from the end of each sequence in FILE: its state is recognised first. Mean and variance are those of all --samples closed
+    /// loops, which begin from several states that explain the sequence
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["sequence", "mean", "initial_state", "data", "contexts", "mode", "open_channels", "no_noise", "mixing"])]
+    from: Option<PathBuf>,
+    /// With --from: recognise the first N samples, 1 to 1000000000, and go on from there
+    #[arg(long, value_name = "N", requires = "from", value_parser = crate::args::count(1, 1_000_000_000))]
+    observed: Option<usize>,
     /// Number of steps, 1 to 1000000000 [default: as many as the data have]
     #[arg(long, value_name = "N", value_parser = crate::args::count(1, 1_000_000_000))]
     steps: Option<usize>,
@@ -99,25 +111,25 @@ enum Mode {
     Mixed,
 }
 
+/// What is written: names and values.
+type Fields = Vec<(&'static str, Dataset)>;
+
 /// Generates.
 pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
-    let inputs = [Some(arguments.run.as_path()), arguments.initial_state.as_deref(), arguments.data.as_deref()];
-    let named = [("RUN", inputs[0]), ("--initial-state", inputs[1]), ("--data", inputs[2])];
+    let files = [&arguments.initial_state, &arguments.data, &arguments.from].map(Option::as_deref);
+    let named = [
+        ("RUN", Some(arguments.run.as_path())),
+        ("--initial-state", files[0]),
+        ("--data", files[1]),
+        ("--from", files[2]),
+    ];
     check_distinct(&[("--out", arguments.out.as_deref())], &named)?;
-    let trained = Trained::open(&arguments.run, arguments.best)?;
-    let feedback = feedback(arguments, &trained.checkpoint)?;
-    let rows = starts::rows(
-        (arguments, &trained),
-        (shared, shared.engine()?.threads()),
-        feedback.0.iter().any(|channel| channel.sensed > 0.0),
-    )?;
-    let starts: Vec<Start<'_>> =
-        rows.iter().map(|row| Start { initial_state: &row.state, sensed: &row.sensed }).collect();
-    let options = GenerationOptions::new(rows.iter().map(|row| row.steps).max().unwrap_or(0), feedback)
-        .seed(arguments.seed)
-        .contexts(arguments.contexts);
-    let generated = generate(&trained.network(), &starts, &options, &shared.engine()?)?;
-    let fields = fields(&trained.checkpoint, &rows, &generated)?;
+    let all = members::open(&arguments.run, arguments.best)?;
+    all.iter().for_each(|trained| shared.say_of(trained));
+    let fields = match &arguments.from {
+        Some(path) => onward::fields(arguments, path, &all, shared)?,
+        None => mixed(arguments, &all, shared)?,
+    };
     if arguments.json {
         output::print_json_line(&as_json(&fields))?;
         return Ok(Ending::Done);
@@ -128,6 +140,53 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         None => output::print(&files::csv(&fields))?,
     }
     Ok(Ending::Done)
+}
+
+/// What one network generates; or a mixture, each member in loops of its own: the moments are those of the mixture, the samples those of
+/// its members in turn.
+fn mixed(arguments: &Arguments, all: &[Trained], shared: &Shared) -> Result<Fields> {
+    if all.len() > 1 && (arguments.initial_state.is_some() || arguments.contexts) {
+        let message = "initial states and contexts are those of one network, and this is a mixture";
+        return Err(Failure::input(
+            message,
+            format!("give one of its members: {}", members::folder(&arguments.run, 1).display()),
+        ));
+    }
+    let mut each = Vec::new();
+    let mut of_first = Vec::new();
+    for (m, trained) in all.iter().enumerate() {
+        let feedback = feedback(arguments, &trained.checkpoint)?;
+        let rows = starts::rows(
+            (arguments, trained),
+            (shared, shared.engine()?.threads()),
+            feedback.0.iter().any(|channel| channel.sensed > 0.0),
+        )?;
+        let starts: Vec<Start<'_>> =
+            rows.iter().map(|row| Start { initial_state: &row.state, sensed: &row.sensed }).collect();
+        let options = GenerationOptions::new(rows.iter().map(|row| row.steps).max().unwrap_or(0), feedback)
+            .seed(arguments.seed.wrapping_add(m as u64))
+            .contexts(arguments.contexts);
+        each.push(generate(&trained.network(), &starts, &options, &shared.engine()?)?);
+        if m == 0 {
+            of_first = rows;
+        }
+    }
+    let Some(trained) = all.first() else { return Ok(Vec::new()) };
+    let generated: Vec<Generated> = match each.as_slice() {
+        [_] => each.swap_remove(0),
+        _ => (0..of_first.len()).map(|row| mixture(&each, row)).collect(),
+    };
+    fields(&trained.checkpoint, &of_first, &generated)
+}
+
+/// The moments of what the members generated in a row, and the sample of one of them.
+fn mixture(each: &[Vec<Generated>], row: usize) -> Generated {
+    let loops: Vec<Generated> = each.iter().map(|one| one[row].clone()).collect();
+    let mut rest = Rest::of(&loops, 0);
+    let mut generated = Generated::default();
+    generated.sample = rest.samples.swap_remove(row % each.len());
+    (generated.mean, generated.variance) = (rest.mean, rest.variance);
+    generated
 }
 
 /// How each channel is fed.
@@ -150,7 +209,7 @@ fn feedback(arguments: &Arguments, checkpoint: &Checkpoint) -> Result<Feedback> 
 }
 
 /// Mean, variance, sample and contexts of all rows, in the data's units, each row as long as it should be.
-fn fields(checkpoint: &Checkpoint, rows: &[Row], generated: &[Generated]) -> Result<Vec<(&'static str, Dataset)>> {
+fn fields(checkpoint: &Checkpoint, rows: &[Row], generated: &[Generated]) -> Result<Fields> {
     let scaling = &checkpoint.scaling;
     let n = checkpoint.channels.len();
     let field = |channels: &[String], of: &dyn Fn(&Generated) -> Vec<f64>| -> Result<Dataset> {
@@ -158,13 +217,7 @@ fn fields(checkpoint: &Checkpoint, rows: &[Row], generated: &[Generated]) -> Res
         for (row, generated) in rows.iter().zip(generated) {
             let mut values = of(generated);
             values.truncate(row.steps * channels.len());
-            if let Some(index) = values.iter().position(|value| !value.is_finite()) {
-                let step = index / channels.len() + 1;
-                return Err(Failure::input(
-                    format!("sequence {} left the finite numbers at step {step}", row.name),
-                    "the network predicts variances without bound here: try --no-noise, or train it further",
-                ));
-            }
+            check_finite(&row.name, &values, channels.len())?;
             sequences.push(Sequence::new(row.name.clone(), channels.len(), values)?);
         }
         Ok(Dataset::new(channels.to_vec(), sequences)?)
@@ -183,6 +236,16 @@ fn fields(checkpoint: &Checkpoint, rows: &[Row], generated: &[Generated]) -> Res
         fields.push(("context", field(&names, &|generated| generated.contexts.clone())?));
     }
     Ok(fields)
+}
+
+/// Refuses values of the sequence `name` that are not finite.
+fn check_finite(name: &str, values: &[f64], channels: usize) -> Result<()> {
+    let Some(index) = values.iter().position(|value| !value.is_finite()) else { return Ok(()) };
+    let step = index / channels + 1;
+    Err(Failure::input(
+        format!("sequence {name} left the finite numbers at step {step}"),
+        "the network predicts variances without bound here: try --no-noise, or train it further",
+    ))
 }
 
 /// For each sequence, its name and its fields as lists of rows.

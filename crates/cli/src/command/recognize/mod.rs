@@ -2,7 +2,9 @@
 //! internal state explains what just happened (thesis 2.10.2)?
 
 mod alike;
+mod completing;
 mod deadline;
+mod locking;
 mod online;
 mod regression;
 
@@ -22,11 +24,13 @@ use crate::args::{Part, Shared};
 use crate::command::generate::unit_names;
 use crate::output;
 use crate::outputs::check_distinct;
+use completing::{Completion, complete};
 use online::{How, Online};
 use scrnn_data::{self as files, Field};
 use scrnn_report::Table;
 use scrnn_run::channel_scores::observed_error;
 use scrnn_run::failure::{Ending, Failure, Result};
+use scrnn_run::members;
 use scrnn_run::trained::Trained;
 
 /// How many of the learned sequences the table names.
@@ -49,7 +53,8 @@ const NAMED: usize = 3;
 ///
 /// With --json each answer is an object: `sample` (its number, from 1), `mean` and `variance` of the next sample in the data's
 /// units (empty before the network's delay is over), `forecast` (the means of the --ahead samples after it), `ln_likelihood`
-/// (nats per step and regarded channel of the window, before and after the regression; null where there was none),
+/// (nats per step and regarded channel of the window, before and after the regression; null where there was none), `locked` (whether the
+/// window is as likely as what was learned, but for one nat per step and channel: else the forecast is not to be relied on),
 /// `milliseconds`, and `missing` (names, if any). With --full it holds `iterations`, `error` and `view` (`from`, `smoothed`,
 /// `contexts`, `predicted`, `variance`) instead.
 #[derive(Debug, Args)]
@@ -58,6 +63,7 @@ Examples:
   scrnn recognize runs/lissajous new.csv
   scrnn recognize runs/lissajous new.csv --starts 40 --out states.npz
   scrnn recognize runs/lissajous new.csv --observed 100 --completed whole.csv
+  scrnn recognize runs/lissajous new.csv --observed 100 --samples 50 --completed rest.npz
   scrnn generate runs/lissajous --initial-state states.npz
   scrnn recognize runs/interact new.csv --online --deadline 5
   robot | scrnn recognize runs/interact - --online --json | controller")]
@@ -77,6 +83,10 @@ pub struct Arguments {
     /// Recognise from the first N samples, 1 to 1000000000, and complete the rest
     #[arg(long, value_name = "N", value_parser = crate::args::count(1, 1_000_000_000))]
     observed: Option<usize>,
+    /// With --observed: complete by N closed loops with noise, 1 to 10000, from several states that explain what was observed. Mean and variance of the
+    /// rest are those of all of them
+    #[arg(long, value_name = "N", requires = "observed", value_parser = crate::args::count(1, 10_000))]
+    samples: Option<usize>,
     /// Rate of the ascent, more than 0, at most 1e6 [default: one that suits most networks]
     #[arg(long, value_name = "RATE", value_parser = crate::args::positive(1e6))]
     rate: Option<f64>,
@@ -115,7 +125,13 @@ struct Found {
     error: f64,
     /// With --observed: (3.5) over the samples that were not observed.
     completion_error: Option<f64>,
-    /// The best initial state.
+    /// With --samples: the rest as a distribution.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    completion: Option<Completion>,
+    /// What each member of a mixture found.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    members: Vec<Found>,
+    /// The best initial state; empty for a mixture, whose members have their own.
     initial_state: Vec<f64>,
     /// The learned sequences, most likely first.
     learned: Vec<Learned>,
@@ -155,7 +171,16 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     if arguments.regression.given() {
         return Err(Failure::input("options of error regression go with --online", "add --online, or leave them out"));
     }
-    let trained = Trained::open(&arguments.run, arguments.best)?;
+    let all = members::open(&arguments.run, arguments.best)?;
+    all.iter().for_each(|trained| shared.say_of(trained));
+    let Some(trained) = all.first() else { return Ok(Ending::Done) };
+    if all.len() > 1 && arguments.out.is_some() {
+        let message = "--out writes the states of one network, and this is a mixture";
+        return Err(Failure::input(
+            message,
+            format!("give one of its members: {}", members::folder(&arguments.run, 1).display()),
+        ));
+    }
     let checkpoint = &trained.checkpoint;
     let part = arguments.part.of(&arguments.data, trained.selection());
     let data = files::read_all(&[&arguments.data], &part)?.data;
@@ -168,12 +193,16 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     }
     let scaled = checkpoint.scaling.apply(&data);
     let engine = shared.engine()?;
-    let recognitions =
-        recognize(&trained.network(), &checkpoint.initial_states, &scaled, &options(arguments, &trained), &engine)?;
     let heard = arguments.observed.unwrap_or(usize::MAX);
-    let generated = replay(&trained, &scaled, &recognitions, heard, &engine)?;
-    let mut found = (0..recognitions.len())
-        .map(|s| summary(&trained, &data.sequences()[s], &recognitions[s], &generated[s], heard))
+    let (mut recognitions, mut generated) = (Vec::new(), Vec::new());
+    for one in &all {
+        let states = &one.checkpoint.initial_states;
+        let found = recognize(&one.network(), states, &scaled, &options(arguments, one), &engine)?;
+        generated.push(replay(one, &scaled, &found, heard, &engine)?);
+        recognitions.push(found);
+    }
+    let mut found = (0..scaled.sequences().len())
+        .map(|s| summary_of_all(&all, &data.sequences()[s], (&recognitions, &generated), s, heard))
         .collect::<Vec<_>>();
     let by_likeness = alike::share_one_state(&trained);
     if by_likeness {
@@ -181,11 +210,26 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     }
 
     if let Some(path) = &arguments.out {
-        let states = states(&trained, &data, &recognitions)?;
+        let states = states(trained, &data, &recognitions[0])?;
         files::write(path, &[Field { name: "", data: &states }])?;
     }
-    if let Some(path) = &arguments.completed {
-        let whole = completed(&trained, &data, &generated, heard)?;
+    if let Some(loops) = arguments.samples {
+        let networks: Vec<_> = all.iter().map(Trained::network).collect();
+        let mixture = members::mixed(&all, &networks);
+        let noise = (loops, arguments.seed);
+        let completions = complete(trained, (&mixture, &recognitions), (&data, heard), noise, &engine)?;
+        if let Some(path) = &arguments.completed {
+            let fields = completing::fields(&data, heard, &completions)?;
+            let fields: Vec<Field<'_>> = fields.iter().map(|(name, data)| Field { name, data }).collect();
+            files::write(path, &fields)?;
+        }
+        for (found, completion) in found.iter_mut().zip(completions) {
+            found.completion_error = completion.as_ref().map(|completion| completion.error);
+            found.completion = completion;
+        }
+    } else if let Some(path) = &arguments.completed {
+        let means: Vec<Vec<f64>> = (0..found.len()).map(|s| mean_of_all(&all, &generated, s)).collect();
+        let whole = completed(trained, &data, &means, heard)?;
         files::write(path, &[Field { name: "", data: &whole }])?;
     }
     if arguments.json {
@@ -194,6 +238,60 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         output::print(&table(&found, arguments.observed.is_some(), by_likeness))?;
     }
     Ok(Ending::Done)
+}
+
+/// What was found for sequence `s` by one network, or by all members of a mixture: the likelihoods are those of the mean of the members'
+/// densities, and the means those of their means.
+fn summary_of_all(
+    all: &[Trained],
+    sequence: &Sequence,
+    (recognitions, generated): (&[Vec<Recognition>], &[Vec<Generated>]),
+    s: usize,
+    heard: usize,
+) -> Found {
+    let mut each: Vec<Found> = (all.iter().zip(recognitions).zip(generated))
+        .map(|((one, recognitions), generated)| {
+            summary(one, sequence, &recognitions[s], &raw_means(one, &generated[s]), heard)
+        })
+        .collect();
+    if let [_] = each.as_slice() {
+        return each.swap_remove(0);
+    }
+    let mean = mean_of_all(all, generated, s);
+    let mut found = summary(&all[0], sequence, &recognitions[0][s], &mean, heard);
+    let delay = all[0].checkpoint.topology.delay();
+    let terms = sequence.targets(delay, heard.min(sequence.len()) - delay).max(1) as f64;
+    let mixed = |values: &[f64]| {
+        let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let mean = values.iter().map(|value| (terms * (value - largest)).exp()).sum::<f64>() / all.len() as f64;
+        largest + mean.ln() / terms
+    };
+    let likelihoods: Option<Vec<f64>> = each.iter().map(|one| one.ln_likelihood).collect();
+    found.ln_likelihood = likelihoods.map(|values| mixed(&values));
+    for learned in &mut found.learned {
+        let of = |one: &Found| one.learned.iter().find(|other| other.number == learned.number)?.ln_likelihood;
+        // What a member does not rank is too unlikely to count.
+        let values: Vec<f64> = each.iter().filter_map(of).collect();
+        learned.ln_likelihood = (!values.is_empty()).then(|| mixed(&values));
+    }
+    let order = |a: &Learned, b: &Learned| {
+        let value = |one: &Learned| one.ln_likelihood.unwrap_or(f64::NEG_INFINITY);
+        value(b).total_cmp(&value(a))
+    };
+    found.learned.sort_by(order);
+    found.start = format!("mixture of {}", all.len());
+    (found.initial_state, found.trials) = (Vec::new(), Vec::new());
+    found.members = each;
+    found
+}
+
+/// The predicted means of sequence `s` in the data's units, averaged over the members.
+fn mean_of_all(all: &[Trained], generated: &[Vec<Generated>], s: usize) -> Vec<f64> {
+    let each: Vec<Vec<f64>> = all.iter().zip(generated).map(|(one, generated)| raw_means(one, &generated[s])).collect();
+    match each.as_slice() {
+        [one] => one.clone(),
+        _ => (0..each[0].len()).map(|at| each.iter().map(|one| one[at]).sum::<f64>() / each.len() as f64).collect(),
+    }
 }
 
 fn options(arguments: &Arguments, trained: &Trained) -> RecognitionOptions {
@@ -236,20 +334,13 @@ fn replay(
     Ok(generate(&trained.network(), &starts, &options, engine)?)
 }
 
-fn summary(
-    trained: &Trained,
-    sequence: &Sequence,
-    recognition: &Recognition,
-    generated: &Generated,
-    heard: usize,
-) -> Found {
+fn summary(trained: &Trained, sequence: &Sequence, recognition: &Recognition, means: &[f64], heard: usize) -> Found {
     let checkpoint = &trained.checkpoint;
     let (n, delay) = (checkpoint.channels.len(), checkpoint.topology.delay());
     let heard = heard.min(sequence.len());
     // What is missing does not count.
     let terms = sequence.targets(delay, heard - delay).max(1) as f64;
     let per_value = |ln_likelihood: f64| checkpoint.topology.has_variance().then(|| ln_likelihood / terms);
-    let means = raw_means(trained, generated);
     let error = |samples: std::ops::Range<usize>| {
         let predicted = &means[(samples.start - delay) * n..(samples.end - delay) * n];
         observed_error(&sequence.values()[samples.start * n..samples.end * n], predicted)
@@ -261,6 +352,8 @@ fn summary(
         ln_likelihood: per_value(best.ln_likelihood),
         error: error(delay..heard),
         completion_error: (heard < sequence.len()).then(|| error(heard..sequence.len())),
+        completion: None,
+        members: Vec::new(),
         initial_state: best.initial_state.clone(),
         learned: recognition
             .ranking
@@ -291,13 +384,13 @@ fn states(trained: &Trained, data: &Dataset, recognitions: &[Recognition]) -> Re
 }
 
 /// What was heard, followed by what the network makes of it.
-fn completed(trained: &Trained, data: &Dataset, generated: &[Generated], heard: usize) -> Result<Dataset> {
+fn completed(trained: &Trained, data: &Dataset, means: &[Vec<f64>], heard: usize) -> Result<Dataset> {
     let checkpoint = &trained.checkpoint;
     let (n, delay) = (checkpoint.channels.len(), checkpoint.topology.delay());
-    let rows = data.sequences().iter().zip(generated).map(|(sequence, generated)| {
+    let rows = data.sequences().iter().zip(means).map(|(sequence, means)| {
         let known = heard.min(sequence.len());
         let mut values = sequence.values()[..known * n].to_vec();
-        values.extend(&raw_means(trained, generated)[(known - delay) * n..(sequence.len() - delay) * n]);
+        values.extend(&means[(known - delay) * n..(sequence.len() - delay) * n]);
         Sequence::new(sequence.name.clone(), n, values)
     });
     Ok(Dataset::new(data.channels().to_vec(), rows.collect::<scrnn::error::Result<_>>()?)?)
@@ -312,18 +405,26 @@ fn raw_means(trained: &Trained, generated: &Generated) -> Vec<f64> {
 fn table(found: &[Found], completed: bool, by_likeness: bool) -> String {
     let likelihood = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.4}"));
     let mut head = vec!["sequence", "start", "ln L", "error"];
+    let distribution = found.iter().any(|one| one.completion.is_some());
     if completed {
         head.push("error beyond");
+    }
+    if distribution {
+        head.push("nll beyond");
+        head.push("within 1, 2 sd");
     }
     head.push(match by_likeness {
         true => "learned sequences most alike (distance of contexts)",
         false => "most likely learned sequences (ln L)",
     });
     let mut table = Table::new(&head);
-    for Found { sequence, start, ln_likelihood, error, completion_error, learned, .. } in found {
+    for Found { sequence, start, ln_likelihood, error, completion_error, completion, learned, .. } in found {
         let mut row = vec![sequence.clone(), start.clone(), likelihood(*ln_likelihood), format!("{error:.3e}")];
         if completed {
             row.push(completion_error.map_or("-".to_owned(), |error| format!("{error:.3e}")));
+        }
+        if distribution {
+            row.extend(completion.as_ref().map_or(["-", "-"].map(String::from), Completion::told));
         }
         let named = learned.iter().take(NAMED).map(|one| {
             let name =

@@ -12,6 +12,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::deadline::{Deadline, Latency};
+use super::locking::{self, Choice};
 use super::regression::RegressionArguments;
 use crate::args::{Part, Shared};
 use crate::command::generate::unit_names;
@@ -40,9 +41,13 @@ pub struct Online {
     /// Channels whose errors are not regressed on
     #[arg(long, alias = "unheeded-channels", value_name = "NAME,...", value_delimiter = ',', requires = "online")]
     masked_channels: Vec<String>,
-    /// Start from the state of the learned sequence of this name or, counted from 1, number [default: their mean]
+    /// Start from the state of the learned sequence of this name or, counted from 1, number [default: their mean for the first samples,
+    /// then the state from which these are most likely]
     #[arg(long, value_name = "NAME|K", requires = "online")]
     sequence: Option<String>,
+    /// Start from the mean of the learned states, and stay with that
+    #[arg(long, requires = "online", conflicts_with = "sequence")]
+    mean: bool,
     /// In the JSON object, show window and future at these samples, each 1 to 1000000000
     #[arg(long, value_name = "K,...", value_delimiter = ',', requires_all = ["online", "json"],
         value_parser = crate::args::count(1, 1_000_000_000))]
@@ -108,6 +113,8 @@ struct Observed {
     ln_likelihood: Option<[f64; 2]>,
     /// (3.5) over the window before and after, in scaled units.
     error: Option<[f64; 2]>,
+    /// Whether the window is as likely as what was learned, but for one nat per step and channel.
+    locked: Option<bool>,
     milliseconds: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     view: Option<View>,
@@ -122,6 +129,7 @@ struct Answer<'a> {
     variance: Vec<f64>,
     forecast: Vec<Vec<f64>>,
     ln_likelihood: Option<[f64; 2]>,
+    locked: Option<bool>,
     milliseconds: f64,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     missing: Vec<&'a str>,
@@ -151,6 +159,8 @@ struct Followed {
     error: [f64; 2],
     /// (3.5) of each sample against what it was predicted as just before, in the data's units.
     prediction_error: f64,
+    /// Share of the samples at which the window was as likely as what was learned, but for one nat per step and channel.
+    locked: Option<f64>,
     latency: Option<Latency>,
     steps: Vec<Observed>,
     #[serde(skip)]
@@ -177,16 +187,22 @@ struct Session<'a> {
     missing: Vec<usize>,
     /// Channels whose errors are regressed on.
     heeded: usize,
+    /// Waits for the first samples, unless it is said where to start.
+    choice: Option<Choice>,
+    options: ErrorRegressionOptions,
+    engine: &'a Engine,
 }
 
 impl<'a> Session<'a> {
-    fn new(online: &Online, how: &How<'_>, trained: &'a Trained, engine: &Engine) -> Result<Self> {
+    fn new(online: &Online, how: &How<'_>, trained: &'a Trained, engine: &'a Engine) -> Result<Self> {
         let options = online.options(how, trained)?;
         let start = online.start(trained)?;
         let heeded = options.mask.iter().filter(|share| **share > 0.0).count();
-        let regression = ErrorRegression::new(&trained.network(), start, options, engine)?;
+        let regression = ErrorRegression::new(&trained.network(), start, options.clone(), engine)?;
+        let choice = (!online.mean && online.sequence.is_none()).then(|| Choice::new(trained));
         let (deadline, scaled) = (how.regression.clock()?, vec![0.0; trained.checkpoint.channels.len()]);
-        Ok(Self { trained, regression, deadline, taken: 0, scaled, missing: Vec::new(), heeded })
+        let missing = Vec::new();
+        Ok(Self { trained, regression, deadline, taken: 0, scaled, missing, heeded, choice, options, engine })
     }
 
     fn observe(&mut self, sample: &[f64]) -> Result<Regression> {
@@ -203,6 +219,14 @@ impl<'a> Session<'a> {
             *scaled = f64::NAN;
         }
         self.taken += 1;
+        if let Some(choice) = &mut self.choice
+            && choice.take(&self.scaled)
+        {
+            if let Some(better) = choice.begin(self.trained, self.options.clone(), self.engine)? {
+                self.regression = better;
+            }
+            self.choice = None;
+        }
         let (regression, scaled) = (&mut self.regression, &self.scaled);
         Ok(self.deadline.sample(|go_on| regression.observe(scaled, go_on))?)
     }
@@ -211,10 +235,13 @@ impl<'a> Session<'a> {
         let values = (done.steps * self.heeded) as f64;
         let has_variance = self.trained.checkpoint.topology.has_variance();
         let regressed = done.iterations > 0 && self.heeded > 0;
+        let ln_likelihood = (regressed && has_variance).then(|| done.ln_likelihood.map(|sum| sum / values));
+        let bound = locking::bound(self.trained);
         Observed {
             sample: self.taken,
             iterations: done.iterations,
-            ln_likelihood: (regressed && has_variance).then(|| done.ln_likelihood.map(|sum| sum / values)),
+            ln_likelihood,
+            locked: ln_likelihood.zip(bound).map(|([_, after], bound)| after >= bound),
             error: regressed.then(|| done.squared_error.map(|sum| sum / (2.0 * values))),
             milliseconds: 1e3 * self.deadline.last().as_secs_f64(),
             view: view.then(|| self.view(ahead)),
@@ -238,7 +265,7 @@ impl<'a> Session<'a> {
 
     /// Takes nothing from the window but the sum of its likelihood.
     fn answer(&self, done: &Regression, ahead: usize) -> Answer<'a> {
-        let Observed { sample, ln_likelihood, milliseconds, .. } = self.told(done, false, ahead);
+        let Observed { sample, ln_likelihood, locked, milliseconds, .. } = self.told(done, false, ahead);
         let (scaling, channels) = (&self.trained.checkpoint.scaling, &self.trained.checkpoint.channels);
         let raw = |mean: &[f64]| mean.iter().enumerate().map(|(i, &y)| scaling.to_raw(i, y)).collect::<Vec<_>>();
         let (mut mean, mut variance, mut forecast) = (Vec::new(), Vec::new(), Vec::new());
@@ -249,7 +276,7 @@ impl<'a> Session<'a> {
             forecast = (1..=ahead).map(|k| raw(self.regression.forecast_mean(k))).collect();
         }
         let missing = self.missing.iter().map(|&channel| channels[channel].as_str()).collect();
-        Answer { sample, mean, variance, forecast, ln_likelihood, milliseconds, missing }
+        Answer { sample, mean, variance, forecast, ln_likelihood, locked, milliseconds, missing }
     }
 
     /// Whether enough samples came for a prediction of the next one.
@@ -287,6 +314,7 @@ pub fn run(
     shared: &Shared,
 ) -> Result<Ending> {
     let trained = Trained::open(run, best)?;
+    shared.say_of(&trained);
     if data == Path::new("-") {
         if out.is_some() || !online.at.is_empty() {
             return Err(Failure::input("--out and --at do not go with a stream", "it is printed as it comes"));
@@ -299,6 +327,12 @@ pub fn run(
     let mut followed = Vec::new();
     for sequence in data.sequences() {
         followed.push(follow(online, how, &trained, sequence, &engine)?);
+    }
+    for one in followed.iter().filter(|one| one.steps.last().is_some_and(|step| step.locked == Some(false))) {
+        shared.say(format_args!(
+            "{} was not found: the window at its end is less likely than what was learned, by more than a nat per step and channel",
+            one.sequence
+        ));
     }
     if let Some(path) = out {
         write(path, &trained, &followed)?;
@@ -343,12 +377,15 @@ fn follow(online: &Online, how: &How<'_>, trained: &Trained, sequence: &Sequence
         let n = pairs.len() as f64;
         (!pairs.is_empty()).then(|| [0, 1].map(|k| pairs.iter().map(|pair| pair[k]).sum::<f64>() / n))
     };
+    let locked: Vec<bool> = steps.iter().filter_map(|step| step.locked).collect();
+    let share = locked.iter().filter(|locked| **locked).count() as f64 / locked.len() as f64;
     Ok(Followed {
         sequence: sequence.name.clone(),
         samples: sequence.len(),
         ln_likelihood: mean(&|step| step.ln_likelihood),
         error: mean(&|step| step.error).unwrap_or_default(),
         prediction_error: squares / (2.0 * values.max(1) as f64),
+        locked: (!locked.is_empty()).then_some(share),
         latency: session.deadline.latency(),
         steps,
         rows,
@@ -363,6 +400,7 @@ fn stream(online: &Online, how: &How<'_>, trained: &Trained, as_json: bool, shar
     let mut session = Session::new(online, how, trained, &engine)?;
     let mut warned = Warned { far: vec![false; channels.len()], ..Warned::default() };
     let known = familiar::learned(trained);
+    let mut locked = None;
     let mut reader = Reader::Listens;
     if !as_json {
         reader = output::offer(&format!("sample,iterations,milliseconds,{}\n", channels.join(",")))?;
@@ -386,6 +424,12 @@ fn stream(online: &Online, how: &How<'_>, trained: &Trained, as_json: bool, shar
         for (channel, &value) in sample.iter().enumerate().filter(|(channel, _)| !session.missing.contains(channel)) {
             warned.far(lines.line_number(), (&channels[channel], channel), (known[channel], value), shared);
         }
+        let now = session.told(&done, false, 0).locked;
+        if now.is_some() && now != locked && !as_json {
+            let found = if now == Some(true) { "found" } else { "not found" };
+            shared.say(format_args!("sample {}: what is followed is {found} among what was learned", session.taken));
+        }
+        locked = now.or(locked);
         reader = match (as_json, online.full) {
             (true, true) => output::offer_json_line(&session.told(&done, true, online.ahead))?,
             (true, false) => output::offer_json_line(&session.answer(&done, online.ahead))?,
@@ -450,8 +494,16 @@ fn write(path: &Path, trained: &Trained, followed: &[Followed]) -> Result<()> {
 fn table(followed: &[Followed]) -> String {
     let pair = |pair: [f64; 2], digits: usize| format!("{:.digits$} -> {:.digits$}", pair[0], pair[1]);
     let deadline = followed.iter().any(|one| one.latency.is_some_and(|latency| latency.missed.is_some()));
-    let mut head =
-        vec!["sequence", "samples", "ln L in the window", "error of prediction", "median ms", "99 % ms", "longest ms"];
+    let mut head = vec![
+        "sequence",
+        "samples",
+        "ln L in the window",
+        "error of prediction",
+        "locked on",
+        "median ms",
+        "99 % ms",
+        "longest ms",
+    ];
     if deadline {
         head.push("missed");
     }
@@ -462,6 +514,7 @@ fn table(followed: &[Followed]) -> String {
             one.samples.to_string(),
             one.ln_likelihood.map_or("-".to_owned(), |found| pair(found, 3)),
             format!("{:.3e}", one.prediction_error),
+            one.locked.map_or("-".to_owned(), |share| format!("{:.0} %", 100.0 * share)),
         ];
         if let Some(Latency { median, p99, longest, missed, .. }) = one.latency {
             row.extend([median, p99, longest].map(|ms| format!("{ms:.3}")));

@@ -85,6 +85,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     let outputs = [("--out", arguments.out.as_deref()), ("--mcap", arguments.mcap.as_deref())];
     check_distinct(&outputs, &[("RUN", Some(&arguments.run))])?;
     let trained = Trained::open(&arguments.run, arguments.best)?;
+    shared.say_of(&trained);
     let checkpoint = &trained.checkpoint;
     if checkpoint.channels.len() != CHANNELS.len() {
         let message = format!("the network's channels are {}", checkpoint.channels.join(", "));

@@ -114,6 +114,7 @@ struct Outcome<'a> {
 pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     check_distinct(&[("--mcap", arguments.mcap.as_deref())], &[("RUN", Some(&arguments.run))])?;
     let trained = Trained::open(&arguments.run, arguments.best)?;
+    shared.say_of(&trained);
     let checkpoint = &trained.checkpoint;
     if checkpoint.channels != REACHING {
         let message = format!("{} predicts {}", trained.path.display(), checkpoint.channels.join(", "));
