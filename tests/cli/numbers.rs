@@ -11,7 +11,7 @@ const VALUES: [&str; 10] =
     ["0", "1", "2", "-1", "2147483648", "4294967296", "9223372036854775808", "18446744073709551615", "1e308", "NaN"];
 
 /// Keys of the experiment file.
-const KEYS: [&str; 40] = [
+const KEYS: [&str; 49] = [
     "seed",
     "data.seed",
     "data.sequences",
@@ -54,6 +54,13 @@ const KEYS: [&str; 40] = [
     "output.checkpoint_seconds",
     "data.rest",
     "training.members",
+    "network.skip_damping",
+    "network.skip_lags",
+    "training.closed_loop.copies",
+    "training.closed_loop.weight",
+    "training.closed_loop.taught",
+    "training.closed_loop.earliest",
+    "training.closed_loop.latest",
 ];
 
 /// Runs a line for so long at most; the exit code, unless it had to be stopped, and what it said.

@@ -111,6 +111,7 @@ fn check_data(data: &Data) -> Check {
                 ("unwrap", data.unwrap.is_some()),
                 ("missing", data.missing.is_some()),
                 ("period", data.period.is_some()),
+                ("rest", data.rest.is_some()),
                 ("channels", data.channels.is_some()),
             ];
             for (key, given) in of_files {
