@@ -64,6 +64,15 @@ fn a_network_is_judged_by_sequences_that_it_did_not_learn_beside_simple_models()
     assert_eq!(place.ok(&format!("{line} --threads 1")), place.ok(&format!("{line} --threads 3")));
     let said = place.ok("evaluate run new.csv --starts 2 --epochs 5 --samples 3");
     assert!(said.contains("recognised as of their own kind: 4 of 4"), "{said}");
+    // What is missing is not scored.
+    let lose = |(k, line): (usize, &str)| match (k % 9, line.rsplit_once(',')) {
+        (8, Some((rest, _))) => format!("{rest},\n"),
+        _ => format!("{line}\n"),
+    };
+    place.write("gaps.csv", movements(11, 2).lines().enumerate().map(lose).collect::<String>());
+    let with_gaps = place.json("evaluate run gaps.csv --json --starts 2 --epochs 5 --samples 3");
+    assert!(with_gaps["one_step"]["after_burn_in"]["nll"].is_f64(), "{with_gaps}");
+    assert!(with_gaps["closed_loop"]["distance"].is_f64());
     let (_, text) = place.fails(2, "evaluate run");
     assert!(text.contains("holds no sequences out"), "{text}");
     place.write("short.csv", "x,y\n1,2\n2,3\n3,4\n");

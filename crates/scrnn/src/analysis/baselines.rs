@@ -24,6 +24,9 @@ pub fn constant(data: &Dataset, delay: usize) -> Option<f64> {
 pub fn constant_of_sequence(data: &Dataset, delay: usize) -> Option<f64> {
     let (mut sum, mut count) = (0.0, 0);
     for sequence in data.sequences() {
+        if (0..data.channels().len()).any(|i| from(sequence, delay, i).next().is_none()) {
+            continue;
+        }
         let steps = sequence.len().saturating_sub(delay);
         let nll = of_errors(data.channels().len(), |i| {
             mean_square_about_mean(&from(sequence, delay, i).collect::<Vec<_>>())
@@ -41,7 +44,7 @@ pub fn last_value(data: &Dataset, delay: usize) -> Option<f64> {
         let differences = data.sequences().iter().flat_map(|sequence| {
             (delay..sequence.len()).map(move |k| (sequence.sample(k)[i] - sequence.sample(k - delay)[i]).powi(2))
         });
-        mean(&differences.collect::<Vec<_>>())
+        mean(&differences.filter(|square| !square.is_nan()).collect::<Vec<_>>())
     })
 }
 
@@ -154,15 +157,14 @@ impl Linear {
 
 /// Mean and standard deviation of channel `i`, or 1 where it never changes: where it begins, and how long its unit is.
 fn unit(data: &Dataset, i: usize) -> Option<(f64, f64)> {
-    let values: Vec<f64> =
-        data.sequences().iter().flat_map(|sequence| from(sequence, 0, i)).filter(|value| value.is_finite()).collect();
+    let values: Vec<f64> = data.sequences().iter().flat_map(|sequence| from(sequence, 0, i)).collect();
     let deviation = mean_square_about_mean(&values)?.sqrt();
     Some((mean(&values)?, if deviation > 0.0 { deviation } else { 1.0 }))
 }
 
-/// Samples of channel `i` that are predicted.
+/// Samples of channel `i` that are predicted, without those that are missing (not a number).
 fn from(sequence: &Sequence, delay: usize, i: usize) -> impl Iterator<Item = f64> {
-    (delay..sequence.len()).map(move |k| sequence.sample(k)[i])
+    (delay..sequence.len()).map(move |k| sequence.sample(k)[i]).filter(|value| !value.is_nan())
 }
 
 fn mean(values: &[f64]) -> Option<f64> {
@@ -198,6 +200,19 @@ mod tests {
         assert!((constant(&data, 1).unwrap() - gaussian_entropy(2.0)).abs() < 1e-15);
         assert!((constant_of_sequence(&data, 1).unwrap() - gaussian_entropy(1.0)).abs() < 1e-15);
         assert_eq!(constant(&set(&[&[2.0; 5]]), 1), None);
+    }
+
+    #[test]
+    fn missing_samples_are_passed_over() {
+        let gap = f64::NAN;
+        let data = set(&[&[100.0, 1.0, gap, -1.0, 1.0, -1.0], &[gap; 4]]);
+        assert!((constant(&data, 1).unwrap() - gaussian_entropy(1.0)).abs() < 1e-15);
+        assert!((constant_of_sequence(&data, 1).unwrap() - gaussian_entropy(1.0)).abs() < 1e-15);
+        assert!((last_value(&data, 1).unwrap() - gaussian_entropy((99.0_f64.powi(2) + 8.0) / 3.0)).abs() < 1e-12);
+        let noise = |k: i32| 1e-3 * f64::from(k * k * k).sin();
+        let mut wave: Vec<f64> = (0..300).map(|k| f64::from(k).sin() + noise(k)).collect();
+        (wave[50], wave[200]) = (gap, gap);
+        assert!(autoregression(&set(&[&wave]), 1, 2).unwrap() < gaussian_entropy(1e-5));
     }
 
     #[test]
