@@ -92,7 +92,7 @@ pub fn train_on(
     source.data.check_for(&topology)?;
     refuse_unbounded(&source.data, &topology)?;
     let scaling = experiment.data.scaling_for(&source.data)?;
-    let scaled = scaling.apply(&source.data);
+    let scaled = scaling.apply(&source.data)?;
     let topology = experiment.topology(&scaled)?;
     if !topology.has_linear_mean() && topology.skip().is_none() {
         warn_out_of_reach(experiment, &scaled, messages);
@@ -107,6 +107,7 @@ pub fn train_on(
             lengths: source.data.sequences().iter().map(|sequence| sequence.len()).collect(),
             ranges: ranges(&source.data).into_iter().map(Option::unwrap_or_default).collect(),
         },
+        numerics: learner.numerics().to_owned(),
         score: None,
         best: None,
     };
