@@ -40,7 +40,7 @@ fn slope(mut value: impl FnMut(f64) -> f64) -> f64 {
 
 impl ByDifferences {
     fn score(&self, run: Run, initial: &[f64]) -> (f64, f64) {
-        likelihood::plain(&self.network, initial, self.data.sequences()[run.sequence].values(), run.steps)
+        likelihood::plain(&self.network, initial, self.data.sequences()[run.sequence].values(), run.steps).unwrap()
     }
 }
 

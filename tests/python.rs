@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use scrnn_sim::recording::{Contact, Heading, Joint, Recorder, Robot};
-use scrnn_sim::scene::{Body, Frame, Part, Scene, Shape};
+use scrnn_sim::world::scene::{Body, Frame, Part, Scene, Shape};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")

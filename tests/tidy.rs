@@ -328,7 +328,7 @@ fn one_file_of_the_library_names_rayon() {
 }
 
 /// Crates whose random numbers all come from `scrnn::streams`. What stands in a file's tests may draw as it likes.
-const FROM_STREAMS: [&str; 2] = ["crates/scrnn/src/", "crates/tasks/src/"];
+const FROM_STREAMS: [&str; 4] = ["crates/scrnn/src/", "crates/tasks/src/", "crates/sim/src/", "crates/reproduce/src/"];
 
 #[test]
 fn one_file_makes_generators_of_random_numbers() {

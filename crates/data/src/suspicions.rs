@@ -225,7 +225,7 @@ fn even_steps(series: &Series<'_>, channel: &str) -> Option<Suspicion> {
     let (_, greatest) = series.bounds()?;
     let rounding = 4.0 * f64::EPSILON * greatest.abs();
     let even = steps.iter().filter(|step| (*step - middle).abs() <= STEP_JITTER * middle + rounding).count();
-    // A gap now and then does not make a clock anything else.
+    // A clock may have some gaps.
     (middle > 0.0 && even * 100 >= steps.len() * 97)
         .then(|| Suspicion::EvenSteps { channel: channel.to_owned(), step: middle })
 }

@@ -31,7 +31,7 @@ const SAMPLES: usize = 300;
 pub fn page(trained: &Trained, source: &Source, rows: &[Row], seed: u64, engine: &Engine) -> Result<Page> {
     let data = &source.data;
     let (checkpoint, network) = (&trained.checkpoint, trained.network());
-    let scaled = checkpoint.scaling.apply(data);
+    let scaled = checkpoint.scaling.apply(data)?;
     let (n, delay) = (scaled.channels().len(), network.topology().delay());
     let initial_states = &checkpoint.initial_states;
     let states: Vec<&[f64]> = (0..initial_states.sequences()).map(|s| initial_states.sequence(s)).collect();
@@ -183,7 +183,7 @@ fn initial_state_plane(trained: &Trained) -> Option<Section> {
     if states.sequences() < 3 || checkpoint.topology.context_units() < 2 {
         return None;
     }
-    let components = PrincipalComponents::of(states.values(), checkpoint.topology.context_units());
+    let components = PrincipalComponents::of(states.values(), checkpoint.topology.context_units())?;
     let points = components.first(2).chunks_exact(2).map(|point| (point[0], point[1])).collect();
     let mark = match states.sequences() {
         ..=30 => Mark::Texts(checkpoint.sequences.clone()),

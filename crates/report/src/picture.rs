@@ -5,7 +5,7 @@
 use std::fmt::Write as _;
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use scrnn_sim::scene::{Body, Part, Scene, Shape};
+use scrnn_sim::world::scene::{Body, Part, Scene, Shape};
 
 use super::chart::{TEXT, Tone, WIDTH, csv_field};
 use super::escape::escaped;

@@ -14,6 +14,10 @@ pub struct Notes {
     pub experiment: Value,
     /// The sequences that were learned.
     pub data: DataNotes,
+    /// The arithmetic that computes, by its [name](scrnn::learning::Learner::numerics). It is written only where it is not the
+    /// one whose bits are promised, which all earlier runs were made with.
+    #[serde(default = "promised", skip_serializing_if = "is_promised")]
+    pub numerics: String,
     /// How well the network of this checkpoint does, once it was evaluated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub score: Option<Score>,
@@ -23,6 +27,17 @@ pub struct Notes {
     /// A factor on the predicted variances, if one was found after the training. Going on with the training drops it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variance_factor: Option<VarianceFactor>,
+}
+
+/// The arithmetic whose bits are the same on all processors.
+const PROMISED: &str = "f64";
+
+fn promised() -> String {
+    PROMISED.to_owned()
+}
+
+fn is_promised(numerics: &str) -> bool {
+    numerics == PROMISED
 }
 
 /// What is known of the sequences.

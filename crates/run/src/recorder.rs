@@ -119,7 +119,7 @@ impl<'a> Recorder<'a> {
             let epoch = self.notes.best.map_or(0, |best| best.epoch);
             let best = self.checkpoint(learner, parameters, initial_states, (epoch, OptimiserState::default()), &notes);
             best.check()?;
-            self.run.write(BEST, &best.to_bytes())?;
+            self.run.write(BEST, &best.to_bytes()?)?;
             self.best_waits = false;
         }
         let notes = Notes { score: self.score_of(learner.epoch()), ..self.notes.clone() };
@@ -127,7 +127,7 @@ impl<'a> Recorder<'a> {
         let newest = self.checkpoint(learner, learner.network().parameters(), learner.initial_states(), state, &notes);
         // Never replace a good file by one that could not be read back.
         newest.check()?;
-        self.run.write(CHECKPOINT, &newest.to_bytes())?;
+        self.run.write(CHECKPOINT, &newest.to_bytes()?)?;
         self.saved = Instant::now();
         self.saved_epoch = Some(learner.epoch());
         Ok(())

@@ -10,6 +10,7 @@ use crate::notes::Notes;
 
 /// Most lengths of sequences that a message lists.
 const MOST_LENGTHS: usize = 20;
+const START_ANEW: &str = "start anew with --overwrite or in another folder with --out";
 
 /// Compares what the checkpoint notes with `now`, and returns `now` with the best score so far.
 ///
@@ -17,7 +18,8 @@ const MOST_LENGTHS: usize = 20;
 /// [`Failure::Refused`], with all differences.
 pub fn check(checkpoint: &Checkpoint, now: Notes, experiment: &Experiment, path: &Path) -> Result<Notes> {
     let folder = path.display();
-    let anew = "undo the change, or start anew with --overwrite or in another folder with --out";
+    let anew = format!("undo the change, or {START_ANEW}");
+    let anew = anew.as_str();
     let Some(then) = Notes::of(checkpoint) else {
         return Err(Failure::refused(format!("the checkpoint in {folder} was not written by `scrnn train`"), anew));
     };
@@ -56,6 +58,14 @@ pub fn check(checkpoint: &Checkpoint, now: Notes, experiment: &Experiment, path:
         };
         return Err(Failure::refused(message, help));
     }
+    if then.numerics != now.numerics {
+        let message = format!(
+            "the run in {folder} was computed by `{}`, and now it would be by `{}`",
+            then.numerics, now.numerics
+        );
+        let help = format!("the two do not come to the same bits: go on as it began, or {START_ANEW}");
+        return Err(Failure::refused(message, help));
+    }
     // Earlier versions did not note ranges; the digest has them in it.
     if (&then.data.digest, &then.data.lengths) != (&now.data.digest, &now.data.lengths) {
         let mut message = format!("the data changed since the run in {folder} began:");
@@ -77,4 +87,57 @@ pub fn check(checkpoint: &Checkpoint, now: Notes, experiment: &Experiment, path:
         return Err(Failure::refused(message, anew));
     }
     Ok(Notes { best: then.best, ..now })
+}
+
+#[cfg(test)]
+mod tests {
+    use scrnn::engine::Engine;
+    use scrnn::initialization::initialize;
+    use scrnn::learning::{Learner, OptimiserState, Plan};
+    use scrnn::scaling::Scaling;
+
+    use super::*;
+    use crate::notes::{DataNotes, learned_part};
+
+    #[test]
+    fn a_run_goes_on_only_with_the_arithmetic_that_it_began_with() {
+        let text = "name = \"x\"\n[data]\ntask = \"sinusoid\"\n[[network.groups]]\nunits = 2\ntime_constant = 2.0\n";
+        let experiment = crate::experiment::read_text("x.toml", text, &[]).unwrap();
+        let data = scrnn::dataset::Dataset::new(
+            vec!["y".to_owned()],
+            vec![scrnn::dataset::Sequence::new("a", 1, vec![0.1, 0.2, 0.3]).unwrap()],
+        )
+        .unwrap();
+        let topology = experiment.topology(&data).unwrap();
+        let (network, initial_states) = initialize(&topology, 1, 1);
+        let learner = Learner::new(network, initial_states, &data, Plan::default(), &Engine::serial()).unwrap();
+        let notes = |numerics: &str| Notes {
+            experiment: learned_part(&experiment),
+            data: DataNotes { digest: "0".to_owned(), lengths: vec![3], ranges: Vec::new() },
+            numerics: numerics.to_owned(),
+            score: None,
+            best: None,
+        };
+        let then = |notes: &Notes| Checkpoint {
+            topology: topology.clone(),
+            parameters: learner.network().parameters().clone(),
+            initial_states: learner.initial_states().clone(),
+            scaling: Scaling::identity(1),
+            channels: data.channels().to_vec(),
+            sequences: vec!["a".to_owned()],
+            first_inputs: vec![0.1],
+            epoch: 0,
+            optimiser: OptimiserState::default(),
+            notes: notes.to_value(),
+        };
+        let check = |began: &str, now: &str| check(&then(&notes(began)), notes(now), &experiment, Path::new("runs/x"));
+        // Earlier runs do not say, and were made with what is promised.
+        assert_eq!(learner.numerics(), "f64");
+        assert!(notes("f64").to_value().get("numerics").is_none());
+        assert!(check("f64", learner.numerics()).is_ok() && check("gpu f32", "gpu f32").is_ok());
+        for (began, now) in [("gpu f32", "f64"), ("f64", "gpu f32")] {
+            let message = check(began, now).unwrap_err().to_string();
+            assert!(message.contains(&format!("computed by `{began}`")) && message.contains(now), "{message}");
+        }
+    }
 }

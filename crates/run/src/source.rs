@@ -1,7 +1,7 @@
 //! Where an experiment's sequences come from: a task, which knows the truth, or files.
 
 use scrnn::dataset::{Dataset, Sequence};
-use scrnn_sim::tutor::{self, Demonstration, Tutoring};
+use scrnn_sim::reach::tutor::{self, Demonstration, Tutoring};
 use sha2::{Digest, Sha256};
 
 use crate::experiment::{Data, Experiment};

@@ -148,7 +148,7 @@ impl Trained {
     pub fn fitted(&self, data: Dataset, path: &Path) -> Result<Dataset> {
         let learned = &self.checkpoint.channels;
         let data = channels::matched(data, learned, &path.display().to_string())?;
-        let scaled = self.checkpoint.scaling.apply(&data);
+        let scaled = self.checkpoint.scaling.apply(&data)?;
         let n = learned.len();
         for sequence in scaled.sequences() {
             if let Some(at) = sequence.values().iter().position(|value| value.abs() >= TOO_FAR) {

@@ -104,7 +104,7 @@ pub fn train_on(
     source.data.check_for(&topology)?;
     refuse_unbounded(&source.data, &topology)?;
     let scaling = experiment.data.scaling_for(&source.data)?;
-    let scaled = scaling.apply(&source.data);
+    let scaled = scaling.apply(&source.data)?;
     let topology = experiment.topology(&scaled)?;
     if !topology.has_linear_mean() && topology.skip().is_none() {
         warn_out_of_reach(experiment, &scaled, messages);
@@ -121,6 +121,7 @@ pub fn train_on(
             ranges: ranges(&source.data).into_iter().map(Option::unwrap_or_default).collect(),
             held_out: held_out::notes(&source),
         },
+        numerics: learner.numerics().to_owned(),
         score: None,
         best: None,
         variance_factor: None,

@@ -46,7 +46,7 @@ pub fn compare(
     (data, truth, scaling): (&Dataset, &Truth, &Scaling),
     engine: &Engine,
 ) -> Result<Option<Comparison>> {
-    let scaled = scaling.apply(data);
+    let scaled = scaling.apply(data)?;
     let n = scaled.channels().len();
     let delay = network.topology().delay();
     let steps = scaled.sequences().iter().map(|sequence| sequence.len() - delay).max().unwrap_or(0);

@@ -73,7 +73,7 @@ impl Verdict {
             }
             _ => None,
         };
-        let scaled = scaling.apply(&source.data);
+        let scaled = scaling.apply(&source.data)?;
         let states: Vec<&[f64]> = (0..scaled.sequences().len()).map(|s| learner.initial_states().sequence(s)).collect();
         let open = assessment::open_loop(learner.network(), &states, &scaled, engine)?;
         Ok(Self {

@@ -50,7 +50,7 @@ fn main() -> std::result::Result<(), Box<dyn std::error::Error>> {
     };
     checkpoint.check()?;
     if let Some(path) = std::env::args().nth(1) {
-        std::fs::write(&path, checkpoint.to_bytes())?;
+        std::fs::write(&path, checkpoint.to_bytes()?)?;
         println!("written: {path}");
     }
     Ok(())

@@ -62,17 +62,15 @@ impl Checkpoint {
     /// Values are written as they are. Where a parameter may be NaN or infinite, ask [`Checkpoint::check`] first:
     /// [`Checkpoint::from_bytes`] refuses such a file.
     ///
-    /// # Panics
-    /// If the parts do not fit each other, which [`Checkpoint::check`] finds, or if names and notes take more than the
-    /// 100 MB that safetensors grants to a header.
-    #[must_use]
-    pub fn to_bytes(&self) -> Vec<u8> {
-        if let Err(error) = self.check_lengths() {
-            panic!("{error}");
-        }
-        let record = serde_json::to_string(&Record::of(self)).expect("strings, finite numbers and JSON become JSON");
+    /// # Errors
+    /// [`Error::Checkpoint`] if the parts do not fit each other, or if names and notes take more than the 100 MB that
+    /// safetensors grants to a header.
+    pub fn to_bytes(&self) -> Result<Vec<u8>> {
+        self.check_lengths()?;
+        let unwritable = |error: &dyn std::fmt::Display| Error::Checkpoint(format!("cannot be written: {error}"));
+        let record = serde_json::to_string(&Record::of(self)).map_err(|error| unwritable(&error))?;
         let metadata = HashMap::from([(KEY.to_owned(), record)]);
-        safetensors::serialize(self.tensors(), Some(metadata)).expect("values fill their shapes, the header is small")
+        safetensors::serialize(self.tensors(), Some(metadata)).map_err(|error| unwritable(&error))
     }
 
     /// Reads a safetensors file.

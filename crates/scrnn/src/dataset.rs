@@ -81,7 +81,7 @@ impl Sequence {
         self.values.is_empty()
     }
 
-    /// The sample at index `step`.
+    /// The sample at index `step`. One that is not there panics, as in a slice.
     #[must_use]
     pub fn sample(&self, step: usize) -> &[f64] {
         &self.values[step * self.channels..(step + 1) * self.channels]

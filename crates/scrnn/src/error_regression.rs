@@ -219,60 +219,40 @@ impl ErrorRegression {
     }
 
     /// y of the sample `steps` after the next one, of 0 to [`ErrorRegressionOptions::ahead`]; from the options' xi on it is
-    /// predicted from predictions alone.
-    ///
-    /// # Panics
-    /// If that is further ahead than the options ask for.
+    /// predicted from predictions alone. None further ahead.
     #[must_use]
-    pub fn forecast_mean(&self, steps: usize) -> &[f64] {
-        self.check_ahead(steps);
-        self.mean_of(self.length + 1 + steps)
+    pub fn forecast_mean(&self, steps: usize) -> Option<&[f64]> {
+        (steps <= self.options.ahead).then(|| self.mean_of(self.length + 1 + steps))
     }
 
     /// v of that sample; empty without variance units.
-    ///
-    /// # Panics
-    /// As [`ErrorRegression::forecast_mean`].
     #[must_use]
-    pub fn forecast_variance(&self, steps: usize) -> &[f64] {
-        self.check_ahead(steps);
+    pub fn forecast_variance(&self, steps: usize) -> Option<&[f64]> {
         let n_v = self.next_variance.len() / (1 + self.options.ahead);
-        &self.next_variance[steps * n_v..(steps + 1) * n_v]
+        (steps <= self.options.ahead).then(|| &self.next_variance[steps * n_v..(steps + 1) * n_v])
     }
 
     /// The context that predicts it, N_C values.
-    ///
-    /// # Panics
-    /// As [`ErrorRegression::forecast_mean`].
     #[must_use]
-    pub fn forecast_context(&self, steps: usize) -> &[f64] {
-        self.check_ahead(steps);
-        &self.states[(self.length + 1 + steps) * self.packed.state_stride..][..self.packed.n_c]
-    }
-
-    fn check_ahead(&self, steps: usize) {
-        assert!(steps <= self.options.ahead, "{steps} steps ahead; the options ask for {}", self.options.ahead);
+    pub fn forecast_context(&self, steps: usize) -> Option<&[f64]> {
+        (steps <= self.options.ahead).then(|| self.context_of(self.length + 1 + steps))
     }
 
     /// The mean that the window now holds for its step `step` of 0 to [`ErrorRegression::window`]; the last is the
-    /// sample to come.
-    ///
-    /// # Panics
-    /// If there is no such step.
+    /// sample to come. None beyond.
     #[must_use]
-    pub fn smoothed_mean(&self, step: usize) -> &[f64] {
-        assert!(step <= self.length, "step {step} of a window of {}", self.length);
-        self.mean_of(step + 1)
+    pub fn smoothed_mean(&self, step: usize) -> Option<&[f64]> {
+        (step <= self.length).then(|| self.mean_of(step + 1))
     }
 
-    /// The context after step `step` of 0 to [`ErrorRegression::window`], N_C values.
-    ///
-    /// # Panics
-    /// If there is no such step.
+    /// The context after step `step` of 0 to [`ErrorRegression::window`], N_C values. None beyond.
     #[must_use]
-    pub fn context(&self, step: usize) -> &[f64] {
-        assert!(step <= self.length, "step {step} of a window of {}", self.length);
-        &self.states[(step + 1) * self.packed.state_stride..][..self.packed.n_c]
+    pub fn context(&self, step: usize) -> Option<&[f64]> {
+        (step <= self.length).then(|| self.context_of(step + 1))
+    }
+
+    fn context_of(&self, step: usize) -> &[f64] {
+        &self.states[step * self.packed.state_stride..][..self.packed.n_c]
     }
 
     /// u at the window's tail, which regression moves, N_C values.

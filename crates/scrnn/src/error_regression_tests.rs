@@ -67,7 +67,7 @@ fn plain(
     mask: &[f64],
 ) -> f64 {
     let delay = network.topology.delay();
-    let mut state = Plain::new(network, tail);
+    let mut state = Plain::at(network, tail);
     let mut means: Vec<Vec<f64>> = means.chunks(3).map(<[f64]>::to_vec).collect();
     let mut sum = 0.0;
     for step in first..first + steps {
@@ -75,7 +75,7 @@ fn plain(
         let fed_back = &means[step - first];
         let mix = |i: usize| shares[i] * sensed[i] + (1.0 - shares[i]) * fed_back[i];
         let x: Vec<f64> = if step < delay { sensed.to_vec() } else { (0..3).map(mix).collect() };
-        state.step(&x);
+        state.advance(&x);
         means.push(state.y.clone());
         for (i, target) in sample(step + delay).iter().enumerate() {
             let term = match state.v.get(i) {
@@ -153,7 +153,7 @@ fn without_iterations_it_predicts_as_the_open_loop_does() {
             let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-13);
             assert!(near(regression.mean(), &open.mean[3 * step..3 * step + 3]), "step {step}");
             assert!(near(regression.variance(), &open.variance[3 * step..3 * step + 3]), "step {step}");
-            assert!(near(regression.context(regression.window()), &open.contexts[13 * step..13 * step + 13]));
+            assert!(near(regression.context(regression.window()).unwrap(), &open.contexts[13 * step..13 * step + 13]));
         }
     }
 }
@@ -303,19 +303,23 @@ fn what_is_forecast_is_what_generation_gives_once_samples_run_out() {
         for steps in 0..=ahead {
             let row = count - delay + steps;
             let own = |list: &[f64], size: usize| list[row * size..(row + 1) * size].to_vec();
-            let found = regression.forecast_mean(steps);
+            let found = regression.forecast_mean(steps).unwrap();
             assert!(close(found, &own(&generated.mean, 3)), "delay {delay}, {count} samples, {steps} ahead: {found:?}");
-            assert!(close(regression.forecast_variance(steps), &own(&generated.variance, 3)));
-            assert!(close(regression.forecast_context(steps), &own(&generated.contexts, 13)));
+            assert!(close(regression.forecast_variance(steps).unwrap(), &own(&generated.variance, 3)));
+            assert!(close(regression.forecast_context(steps).unwrap(), &own(&generated.contexts, 13)));
         }
-        assert_eq!(regression.forecast_mean(0), regression.mean());
+        assert_eq!(regression.forecast_mean(0), Some(regression.mean()));
+        let beyond = regression.window() + 1;
+        assert!(regression.smoothed_mean(beyond).is_none() && regression.context(beyond).is_none());
+        assert!(regression.forecast_mean(99).is_none() && regression.forecast_variance(99).is_none());
+        assert!(regression.forecast_context(99).is_none());
     }
 }
 
 /// Samples of which some values are missing, the first one's among them.
 fn gapped(t: usize) -> [f64; 3] {
     let mut x = sample(t);
-    if t % 3 == 0 {
+    if t.is_multiple_of(3) {
         x[t % 2] = f64::NAN;
     }
     if t % 7 == 5 {
@@ -416,10 +420,12 @@ fn with_features_and_missing_values_it_forecasts_what_generation_gives() {
             for step in 0..=ahead {
                 let row = count - delay + step;
                 for i in 0..3 {
-                    let (found, expected) = (regression.forecast_mean(step)[i], generated[0].mean[3 * row + i]);
+                    let (found, expected) =
+                        (regression.forecast_mean(step).unwrap()[i], generated[0].mean[3 * row + i]);
                     let name = format!("delay {delay}, kind {kind}, {step} ahead, channel {i}");
                     assert!((found - expected).abs() < 1e-11, "{name}: {found} instead of {expected}");
-                    let (found, expected) = (regression.forecast_variance(step)[i], generated[0].variance[3 * row + i]);
+                    let (found, expected) =
+                        (regression.forecast_variance(step).unwrap()[i], generated[0].variance[3 * row + i]);
                     assert!((found / expected - 1.0).abs() < 1e-11, "{name}: variance {found} instead of {expected}");
                 }
             }

@@ -1,19 +1,15 @@
 //! Measures of what was learned: errors, likelihoods of simple models, agreement with the truth.
 
-/// Pearson's correlation; none for fewer than two values or where one list is constant.
-///
-/// # Panics
-/// If the lists have different lengths.
+/// Pearson's correlation; none for fewer than two values, where one list is constant, or where the lists differ in length.
 #[must_use]
 pub fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
-    assert_eq!(a.len(), b.len(), "a correlation is of pairs");
     let n = a.len() as f64;
     let mean = |list: &[f64]| list.iter().sum::<f64>() / n;
     let (mean_a, mean_b) = (mean(a), mean(b));
     let product =
         |x: &[f64], mx: f64, y: &[f64], my: f64| -> f64 { x.iter().zip(y).map(|(x, y)| (x - mx) * (y - my)).sum() };
     let scale = (product(a, mean_a, a, mean_a) * product(b, mean_b, b, mean_b)).sqrt();
-    (a.len() >= 2 && scale > 0.0).then(|| product(a, mean_a, b, mean_b) / scale)
+    (a.len() == b.len() && a.len() >= 2 && scale > 0.0).then(|| product(a, mean_a, b, mean_b) / scale)
 }
 
 /// E of (3.5): half the squared error per value.

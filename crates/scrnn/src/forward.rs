@@ -17,6 +17,7 @@ use pulp::Simd;
 
 use crate::batch::Block;
 use crate::dataset::Sequence;
+use crate::error::{Error, Result};
 use crate::features::{Features, Past};
 use crate::kernels::activation::tanh_rows;
 use crate::kernels::copy_few;
@@ -48,12 +49,18 @@ pub struct Plain<'a> {
 impl<'a> Plain<'a> {
     /// The network at its initial state `u0`, N_C values.
     ///
-    /// # Panics
-    /// If `u0` has another length.
-    #[must_use]
-    pub fn new(network: &'a Network, u0: &[f64]) -> Self {
+    /// # Errors
+    /// [`Error::Length`] for a `u0` of another size.
+    pub fn new(network: &'a Network, u0: &[f64]) -> Result<Self> {
+        let needed = network.topology.context_units();
+        if u0.len() != needed {
+            return Err(Error::Length { what: "the initial state".into(), found: u0.len(), needed });
+        }
+        Ok(Self::at(network, u0))
+    }
+
+    pub(crate) fn at(network: &'a Network, u0: &[f64]) -> Self {
         let topology = &network.topology;
-        assert_eq!(u0.len(), topology.context_units(), "one initial value for each context unit");
         let features = Features::new(topology);
         Self {
             network,
@@ -69,7 +76,19 @@ impl<'a> Plain<'a> {
     }
 
     /// Advances one step with the sample `x`, N_O values; NaN is missing.
-    pub fn step(&mut self, x: &[f64]) {
+    ///
+    /// # Errors
+    /// [`Error::Length`] for a sample of another size.
+    pub fn step(&mut self, x: &[f64]) -> Result<()> {
+        let needed = self.network.topology.channels();
+        if x.len() != needed {
+            return Err(Error::Length { what: "the sample".into(), found: x.len(), needed });
+        }
+        self.advance(x);
+        Ok(())
+    }
+
+    pub(crate) fn advance(&mut self, x: &[f64]) {
         let topology = &self.network.topology;
         let due = (self.means.len() == topology.delay()).then(|| self.means.remove(0));
         let last = self.past.at(0).to_vec();
@@ -243,8 +262,8 @@ mod tests {
             ],
         );
         let network = Network { topology, parameters };
-        let mut plain = Plain::new(&network, &[1.0]);
-        plain.step(&[0.8]);
+        let mut plain = Plain::at(&network, &[1.0]);
+        plain.advance(&[0.8]);
         // u = 0.5 * 1 + 0.5 * (0.4 - tanh 1 + 0.25) = 0.825 - 0.380797077977882
         assert!((plain.u[0] - 0.444_202_922_022_118).abs() < 1e-14);
         // tanh 0.444202922022118 = 0.417137253072...; y = tanh(2 c - 0.5), v = exp(c - 3)
@@ -263,9 +282,9 @@ mod tests {
         let mut parameters = Parameters::zeros(&topology);
         set(&mut parameters, &[(Parameter::ContextBias, &[0.7])]);
         let network = Network { topology, parameters };
-        let mut plain = Plain::new(&network, &[-1.0]);
+        let mut plain = Plain::at(&network, &[-1.0]);
         for t in 1..=50 {
-            plain.step(&[123.0]);
+            plain.advance(&[123.0]);
             let closed = 0.7 + (-1.0 - 0.7) * 0.9_f64.powi(t);
             assert!((plain.u[0] - closed).abs() < 1e-13, "step {t}: {} instead of {closed}", plain.u[0]);
         }
@@ -277,10 +296,10 @@ mod tests {
         let topology = Topology::new(1, 1, groups, Prediction::MeanAndVariance { floor: 0.0 }).unwrap();
         let (network, _) = crate::initialization::initialize(&topology, 1, 3);
         let run = |x: f64| {
-            let mut plain = Plain::new(&network, &[0.0, 0.0, 0.5]);
-            plain.step(&[x]);
+            let mut plain = Plain::at(&network, &[0.0, 0.0, 0.5]);
+            plain.advance(&[x]);
             let first = plain.u[2];
-            plain.step(&[x]);
+            plain.advance(&[x]);
             (first, plain.u[2])
         };
         assert_eq!(run(0.9).0, run(-0.9).0);

@@ -315,9 +315,9 @@ mod tests {
         let (network, sensed) = (network(3, 0.01), samples(40));
         let start = Start { initial_state: &U0, sensed: &sensed };
         let open = generate(&network, &[start], &options(40, Feedback::open(2)), &Engine::serial()).unwrap();
-        let mut plain = Plain::new(&network, &U0);
+        let mut plain = Plain::at(&network, &U0);
         for (k, x) in sensed.chunks_exact(2).enumerate() {
-            plain.step(x);
+            plain.advance(x);
             assert!(close(&open[0].mean[2 * k..2 * k + 2], &plain.y), "mean of step {k}");
             assert!(close(&open[0].variance[2 * k..2 * k + 2], &plain.v), "variance of step {k}");
             assert!(close(&open[0].contexts[13 * k..13 * (k + 1)], &plain.c), "context of step {k}");
@@ -329,10 +329,10 @@ mod tests {
         let (network, sensed) = (network(3, 0.0), samples(3));
         let start = Start { initial_state: &U0, sensed: &sensed };
         let closed = generate(&network, &[start], &options(30, Feedback::closed(2, false)), &Engine::serial()).unwrap();
-        let mut plain = Plain::new(&network, &U0);
+        let mut plain = Plain::at(&network, &U0);
         let mut inputs = sensed.clone();
         for k in 0..30 {
-            plain.step(&inputs[2 * k..2 * k + 2]);
+            plain.advance(&inputs[2 * k..2 * k + 2]);
             inputs.extend_from_slice(&plain.y);
             assert!(close(&closed[0].mean[2 * k..2 * k + 2], &plain.y), "step {k}");
         }
@@ -346,11 +346,11 @@ mod tests {
         let feedback = Feedback(vec![rule(0.25), rule(1.0)]);
         let start = Start { initial_state: &U0, sensed: &sensed };
         let mixed = generate(&network, &[start], &options(20, feedback), &Engine::serial()).unwrap();
-        let mut plain = Plain::new(&network, &U0);
+        let mut plain = Plain::at(&network, &U0);
         let mut last = None;
         for (k, x) in sensed.chunks_exact(2).enumerate() {
             let first = last.map_or(x[0], |y: f64| 0.25 * x[0] + 0.75 * y);
-            plain.step(&[first, x[1]]);
+            plain.advance(&[first, x[1]]);
             last = Some(plain.y[0]);
             assert!(close(&mixed[0].mean[2 * k..2 * k + 2], &plain.y), "step {k}");
         }

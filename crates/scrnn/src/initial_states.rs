@@ -60,13 +60,13 @@ impl InitialStates {
         self.values.len() / self.units
     }
 
-    /// u_0 of sequence `s`, N_C values.
+    /// u_0 of sequence `s`, N_C values. A sequence that is not there panics, as in a slice.
     #[must_use]
     pub fn sequence(&self, s: usize) -> &[f64] {
         &self.values[s * self.units..(s + 1) * self.units]
     }
 
-    /// u_0 of sequence `s`, to change.
+    /// u_0 of sequence `s`, to change. Panics as [`InitialStates::sequence`].
     pub fn sequence_mut(&mut self, s: usize) -> &mut [f64] {
         &mut self.values[s * self.units..(s + 1) * self.units]
     }

@@ -11,6 +11,7 @@
 
 use pulp::Simd;
 
+use crate::error::{Error, Result};
 use crate::forward::Plain;
 use crate::kernels::activation::{exp_slice, ln_slice};
 use crate::network::Network;
@@ -26,13 +27,19 @@ pub fn ln_gaussian(target: f64, y: f64, v: f64) -> f64 {
 
 /// ln L_out of one sequence (-E without variance) and its sum of squared errors, in plain loops: the reference.
 /// `samples` is row-major; the first `steps` + xi are used, and NaN does not count.
-#[must_use]
-pub fn plain(network: &Network, u0: &[f64], samples: &[f64], steps: usize) -> (f64, f64) {
+///
+/// # Errors
+/// [`Error::Length`] for an initial state of another size, or too few samples.
+pub fn plain(network: &Network, u0: &[f64], samples: &[f64], steps: usize) -> Result<(f64, f64)> {
     let (n_x, delay) = (network.topology.channels(), network.topology.delay());
-    let mut state = Plain::new(network, u0);
+    let needed = steps.saturating_add(delay).saturating_mul(n_x);
+    if samples.len() < needed {
+        return Err(Error::Length { what: "the sequence".into(), found: samples.len(), needed });
+    }
+    let mut state = Plain::new(network, u0)?;
     let (mut ln_likelihood, mut squared_error) = (0.0, 0.0);
     for k in 0..steps {
-        state.step(&samples[k * n_x..(k + 1) * n_x]);
+        state.advance(&samples[k * n_x..(k + 1) * n_x]);
         for (i, target) in samples[(k + delay) * n_x..][..n_x].iter().enumerate().filter(|(_, target)| !target.is_nan())
         {
             let squared = (target - state.y[i]).powi(2);
@@ -43,7 +50,7 @@ pub fn plain(network: &Network, u0: &[f64], samples: &[f64], steps: usize) -> (f
             };
         }
     }
-    (ln_likelihood, squared_error)
+    Ok((ln_likelihood, squared_error))
 }
 
 /// The same values of many predictions, side by side.

@@ -95,8 +95,8 @@ impl Pairs {
     }
 
     /// s and d, `[held, len]`, and the row of the next pair.
-    pub fn rows(&mut self) -> (&mut Vec<f64>, &mut Vec<f64>, usize) {
-        (&mut self.moves, &mut self.changes, self.next)
+    pub fn rows(&self) -> (&[f64], &[f64], usize) {
+        (&self.moves, &self.changes, self.next)
     }
 
     /// Takes over the pairs of [`Self::rows`], of which the first `held` rows count.

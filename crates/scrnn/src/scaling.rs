@@ -99,28 +99,34 @@ impl Scaling {
         self.scale.len()
     }
 
-    /// A value of `channel` in the network's units.
+    /// A value of `channel` in the network's units. A channel is an index: one that is not there panics, as in a slice.
     #[must_use]
     pub fn to_scaled(&self, channel: usize, raw: f64) -> f64 {
         (raw - self.offset[channel]) * self.scale[channel]
     }
 
-    /// A value of `channel` in the data's units.
+    /// A value of `channel` in the data's units. Panics as [`Scaling::to_scaled`].
     #[must_use]
     pub fn to_raw(&self, channel: usize, scaled: f64) -> f64 {
         scaled / self.scale[channel] + self.offset[channel]
     }
 
-    /// A variance of `channel` in the data's units.
+    /// A variance of `channel` in the data's units. Panics as [`Scaling::to_scaled`].
     #[must_use]
     pub fn variance_to_raw(&self, channel: usize, scaled: f64) -> f64 {
         scaled / self.scale[channel].powi(2)
     }
 
     /// The whole set in the network's units.
-    #[must_use]
-    pub fn apply(&self, data: &Dataset) -> Dataset {
-        data.map(|channel, raw| self.to_scaled(channel, raw))
+    ///
+    /// # Errors
+    /// [`Error::Length`] for a set of another number of channels.
+    pub fn apply(&self, data: &Dataset) -> Result<Dataset> {
+        let (found, needed) = (data.channels().len(), self.channels());
+        if found != needed {
+            return Err(Error::Length { what: "the list of channels".into(), found, needed });
+        }
+        Ok(data.map(|channel, raw| self.to_scaled(channel, raw)))
     }
 }
 
@@ -139,5 +145,7 @@ mod tests {
         assert_eq!(scaling.to_scaled(1, 5.0), 0.0);
         assert!((scaling.to_raw(0, scaling.to_scaled(0, 2.3)) - 2.3).abs() < 1e-15);
         assert!((scaling.variance_to_raw(0, 0.64) - 1.0).abs() < 1e-15);
+        let message = Scaling::identity(3).apply(&data).unwrap_err().to_string();
+        assert_eq!(message, "the list of channels holds 2 values; needed: 3");
     }
 }

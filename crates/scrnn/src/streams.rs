@@ -48,14 +48,14 @@ pub enum Purpose {
     TrialOrders = 13,
     /// Where things are put in trials; index: the trial.
     TrialPlaces = 14,
-    /// What a controller that stands in for a network draws; index: the trial.
+    /// What a controller that stands in for a network draws; index: the kind of its noise.
     StandIn = 15,
     /// What is kept out of a training to judge it: which sequences of the data (index 0), or a seed for data that are made anew
     /// (index: the set, from 1).
     HeldOut = 16,
     /// A seed for closed loops that a study generates; index: the loop's kind.
     StudyLoops = 17,
-    /// A seed for the trials of a study; index: the condition.
+    /// A seed for the trials of a study; index: the trial.
     StudyTrials = 18,
     /// Where a training's closed loops begin, and seeds of their noise; index: the epoch.
     ClosedLoopStarts = 19,
@@ -117,7 +117,7 @@ mod tests {
 
     use super::*;
 
-    const PURPOSES: [Purpose; 18] = [
+    const PURPOSES: [Purpose; 20] = [
         Purpose::InitialWeights,
         Purpose::BatchMembers,
         Purpose::BatchOrder,
@@ -136,7 +136,18 @@ mod tests {
         Purpose::HeldOut,
         Purpose::StudyLoops,
         Purpose::StudyTrials,
+        Purpose::ClosedLoopStarts,
+        Purpose::ClosedLoopNoise,
     ];
+
+    #[test]
+    fn every_purpose_is_among_those_that_are_tested() {
+        let numbers: Vec<u64> = PURPOSES.iter().map(|purpose| *purpose as u64).collect();
+        let last =
+            include_str!("streams.rs").lines().filter_map(|line| line.trim().strip_suffix(',')?.split_once(" = "));
+        let last = last.filter_map(|(_, number)| number.parse::<u64>().ok()).max().unwrap();
+        assert_eq!(numbers, (1..=last).collect::<Vec<_>>());
+    }
 
     #[test]
     fn no_two_triples_draw_the_same_first_number() {

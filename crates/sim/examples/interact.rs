@@ -12,7 +12,7 @@ use scrnn_sim::interact::{CHANNELS, Film, Interaction, InteractionOptions, PERIO
 
 fn main() -> Result<(), Box<dyn Error>> {
     let order = parse_order("LR")?;
-    let mut interaction = Interaction::new(&order, &InteractionOptions::default(), 1)?;
+    let mut interaction = Interaction::new(&order, &InteractionOptions::default(), 1, 0)?;
     let mut film = Film::new(&[("example", "interact")])?;
     film.begin("LR")?;
     println!("seconds {}", CHANNELS.map(|name| format!("{name:>15}")).concat());

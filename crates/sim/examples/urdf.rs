@@ -34,16 +34,19 @@ fn main() -> Result<(), Box<dyn Error>> {
         &robot,
         &Placement { name: "robot", world_from_root, posture: &start, part: Part::Robot, hands: &[] },
     )?;
-    world.set_goals(id, &goals);
+    world.set_goals(id, &goals)?;
     while world.time() < 1.0 {
         world.step();
     }
     println!("\n{:<20} {:>10} {:>10} {:>10}", "after a second, rad", "from", "goal", "angle");
-    for (((joint, _), start), (goal, angle)) in robot.movable().zip(&start).zip(goals.iter().zip(world.angles(id))) {
+    for (((joint, _), start), (goal, angle)) in
+        robot.movable().zip(&start).zip(goals.iter().zip(world.robot(id)?.angles()))
+    {
         println!("{:<20} {start:>10.4} {goal:>10.4} {angle:>10.4}", joint.name);
     }
-    if let Some(contact) = world.self_collision(id) {
-        let [a, b] = contact.bodies.map(|body| world.name(body));
+    if let Some(contact) = world.self_collision(id)? {
+        let [a, b] = contact.bodies;
+        let (a, b) = (world.name(a)?, world.name(b)?);
         println!("\n{a} and {b} touch");
     }
     Ok(())

@@ -37,6 +37,26 @@ pub enum Error {
         present: String,
     },
 
+    /// A number that stands for nothing here.
+    #[error("there is no {what} {index}; there are {count}, counted from 0")]
+    NoSuch {
+        /// Joint or link.
+        what: &'static str,
+        /// The number asked for.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
+
+    /// A robot or a body of another world.
+    #[error("the {what} is of another world; those of this one are: {present}")]
+    Elsewhere {
+        /// Robot or body.
+        what: &'static str,
+        /// All names.
+        present: String,
+    },
+
     /// A name that is already taken.
     #[error("the name `{0}` is already taken")]
     Taken(String),

@@ -19,18 +19,6 @@ pub mod recording;
 pub mod robot;
 pub mod world;
 
-mod streams;
-
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;
-
-// The paths before the modules had folders, for callers that still use them.
-#[doc(hidden)]
-pub use interact::{self as film, self as follower, self as interaction};
-#[doc(hidden)]
-pub use reach::{agent, channels, recording as reaching_recording, stage as reaching, touching, tutor};
-#[doc(hidden)]
-pub use robot::{camera, gaze, joints, kinematics, nao};
-#[doc(hidden)]
-pub use world::scene;

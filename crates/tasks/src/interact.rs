@@ -4,8 +4,8 @@ use scrnn::analysis::excursions::Side;
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::jobs::side_by_side;
 use scrnn_sim::error::{Error, Result};
-use scrnn_sim::film::Film;
-use scrnn_sim::interaction::{CHANNELS, InteractionOptions, SensorNoise, all_orders, letters, record, samples};
+use scrnn_sim::interact::Film;
+use scrnn_sim::interact::{CHANNELS, InteractionOptions, SensorNoise, all_orders, letters, record, samples};
 use scrnn_sim::recording::RecordingError;
 
 use crate::Task;
@@ -16,11 +16,6 @@ pub const BRANCHES: usize = 5;
 /// Number of orders, and of samples in each.
 pub fn size() -> (usize, usize) {
     (1 << BRANCHES, samples(&[Side::Left; BRANCHES]))
-}
-
-/// The seed of order `k`.
-fn seed_of(seed: u64, k: usize) -> u64 {
-    seed.wrapping_add((k as u64) << 32)
 }
 
 /// The first orders, each with so many of its samples; a simulation for each of them, side by side on the cores.
@@ -52,7 +47,7 @@ pub fn make_while<E: From<Error> + Send>(
     let quiet = SensorNoise([0.0; CHANNELS.len()]);
     let one = |k: usize, _threads: usize| -> std::result::Result<_, E> {
         begin(k)?;
-        Ok(recorded(&orders[k], seed_of(seed, k), steps)?)
+        Ok(recorded(&orders[k], (seed, k as u64), steps)?)
     };
     let both = side_by_side(sequences, threads, one)?;
     let (data, means): (Vec<Sequence>, Vec<Sequence>) = both.into_iter().unzip();
@@ -65,7 +60,7 @@ pub fn make_while<E: From<Error> + Send>(
 }
 
 /// An order as the sensors gave it, and without their noise.
-fn recorded(order: &[Side], seed: u64, steps: usize) -> Result<(Sequence, Sequence)> {
+fn recorded(order: &[Side], seed: (u64, u64), steps: usize) -> Result<(Sequence, Sequence)> {
     let mut truth = Vec::new();
     let noisy = record(order, &InteractionOptions::default(), seed, steps, |interaction, _| {
         truth.extend(interaction.truth());
@@ -82,7 +77,7 @@ pub fn film((sequences, steps): (usize, usize), seed: u64) -> std::result::Resul
     let mut failed = None;
     for (k, order) in all_orders(BRANCHES).iter().take(sequences).enumerate() {
         film.begin(&letters(order))?;
-        record(order, &InteractionOptions::default(), seed_of(seed, k), steps, |interaction, sample| {
+        record(order, &InteractionOptions::default(), (seed, k as u64), steps, |interaction, sample| {
             if failed.is_none() {
                 failed = film.frame(interaction, sample, None).err();
             }

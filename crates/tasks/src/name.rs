@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use scrnn_sim::error::{Error, Result};
-use scrnn_sim::tutor::Tutoring;
+use scrnn_sim::reach::tutor::Tutoring;
 
 use crate::{Task, interact, limit_cycle, lissajous, patterns, sinusoid};
 
@@ -115,7 +115,7 @@ impl FromStr for TaskName {
 ///
 /// # Errors
 /// [`Error::Setting`] for a size that the task does not have, and for [`TaskName::Reach`], whose truth is unknown:
-/// [`scrnn_sim::tutor::demonstrate`] makes its demonstrations.
+/// [`scrnn_sim::reach::tutor::demonstrate`] makes its demonstrations.
 pub fn make(task: TaskName, (sequences, steps): (usize, usize), seed: u64, threads: usize) -> Result<Task> {
     Ok(match task {
         TaskName::Lissajous => lissajous::generate(&lissajous::Options { sequences, steps }, seed)?,

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use scrnn_run::source;
-use scrnn_sim::reaching::PERIOD;
-use scrnn_sim::reaching_recording::{DemonstrationSample, ReachingRecording};
-use scrnn_sim::tutor::{self, Demonstration};
+use scrnn_sim::reach::recording::{DemonstrationSample, ReachingRecording};
+use scrnn_sim::reach::stage::PERIOD;
+use scrnn_sim::reach::tutor::{self, Demonstration};
 use scrnn_tasks::{Task, TaskName, interact, make};
 
 use crate::args::{self, Shared};

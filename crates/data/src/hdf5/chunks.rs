@@ -123,7 +123,7 @@ impl Grid {
         let mut origin = vec![0; self.shape.len()];
         let mut rest = number;
         for (place, (&axis, &count)) in order.axes.iter().zip(&order.counts).enumerate().rev() {
-            // The first axis may have grown beyond what was foreseen.
+            // The first axis may have grown beyond what the header said.
             let index = if place == 0 { rest } else { rest % count };
             rest /= count;
             let begin = usize::try_from(index).ok().and_then(|index| index.checked_mul(self.chunk[axis]));

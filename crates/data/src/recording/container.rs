@@ -16,9 +16,8 @@ use crate::RecordingProblem;
 
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
-/// A file may unpack to this many times its own size,
+/// A file may unpack to `LARGEST_RATIO` times its own size and `FREE` bytes more.
 const LARGEST_RATIO: u64 = 1000;
-/// and to these bytes more.
 const FREE: u64 = 4 << 20;
 
 /// What a zstd decoder may look back on: what every decoder grants (RFC 8878), or a whole chunk.

@@ -18,7 +18,7 @@ use scrnn_tasks::{TaskName, make};
 
 use crate::framework::preset::asset;
 use crate::framework::{
-    CLOSED_LOOP, Condition, Desk, HELD_OUT, Job, Kind, Learned, Measure, Result, Results, Study, Verdict,
+    Condition, Desk, Job, Kind, Learned, Measure, Result, Results, Study, Verdict, closed_loop, held_out,
 };
 use findings::{Ctrnn, Findings, Material, Pattern, Recognised};
 use recognition::{STEPS, recognition};
@@ -68,6 +68,10 @@ impl Study for Curves {
         self.title
     }
 
+    fn edition(&self) -> u32 {
+        2
+    }
+
     fn conditions(&self, _beyond: bool) -> Vec<Condition> {
         vec![Condition::only(self.networks)]
     }
@@ -78,21 +82,21 @@ impl Study for Curves {
         let (network, data) = (&learned.network, &learned.source.data);
         let (n, delay, count) = (data.channels().len(), network.topology().delay(), data.sequences().len());
         let ideal = make(self.task, (count, STEPS + delay), seed, 1)?;
-        let new = make(self.task, (count, STEPS), seed + HELD_OUT, 1)?.data;
+        let new = make(self.task, (count, STEPS), held_out(seed, 0), 1)?.data;
         let true_variances: Vec<f64> =
             ideal.variances.sequences().iter().map(|sequence| sequence.sample(0)[0]).collect();
         let bounds: Vec<f64> = true_variances.iter().map(|v| success_bound(v.sqrt())).collect();
         let target = |s: usize| &ideal.means.sequences()[s].values()[delay * n..];
         let error = |s: usize, generated: &Generated| half_mean_squared_error(target(s), &generated.mean);
 
-        let closed_loop = |network: &Learned, noise: bool, contexts: bool| {
+        let run = |network: &Learned, noise: bool, contexts: bool| {
             let feedback = Feedback::closed(n, noise);
-            let options = GenerationOptions::new(STEPS, feedback).seed(seed + CLOSED_LOOP).contexts(contexts);
+            let options = GenerationOptions::new(STEPS, feedback).seed(closed_loop(seed, 0)).contexts(contexts);
             assessment::run(&network.network, &network.states(), data, &options, engine)
         };
-        let closed = closed_loop(learned, true, count <= 12)?;
+        let closed = run(learned, true, count <= 12)?;
         desk.at(|| "the CTRNN on its own".to_owned())?;
-        let ctrnn = networks.get(1).map(|network| closed_loop(network, false, false)).transpose()?;
+        let ctrnn = networks.get(1).map(|network| run(network, false, false)).transpose()?;
         let counts = match self.recognition {
             true => Some(desk.part("recognition", || recognition(learned, &new, (&target, &bounds), seed, desk))?),
             false => None,
@@ -130,7 +134,7 @@ impl Study for Curves {
         let states = learned.initial_states.values();
         let units = network.topology().context_units();
         let components = PrincipalComponents::of(states, units);
-        let plane = components.first(2);
+        let plane = components.as_ref().map(|components| components.first(2)).unwrap_or_default();
         let chance = |points: &[f64], width: usize| clustering::against_chance(points, width, &levels, SHUFFLES, seed);
 
         desk.at(|| "one step ahead".to_owned())?;
@@ -161,7 +165,7 @@ impl Study for Curves {
             }),
             clustering_plane: chance(&plane, plane.len() / count),
             clustering_all: chance(states, units),
-            plane_share: components.share(2),
+            plane_share: components.map_or(0.0, |components| components.share(2)),
             assessment,
             patterns,
         };

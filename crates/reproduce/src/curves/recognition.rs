@@ -6,7 +6,7 @@ use scrnn::generation::{Feedback, GenerationOptions, Start, generate};
 use scrnn::recognition::{RecognitionOptions, WarmStart, recognize};
 use scrnn_tasks::lissajous::PERIOD;
 
-use crate::framework::{CLOSED_LOOP, Desk, Learned, Result};
+use crate::framework::{Desk, Learned, Result, closed_loop};
 
 /// Steps of each closed loop (3.2.3).
 pub const STEPS: usize = 1000;
@@ -57,7 +57,7 @@ pub fn recognition<'a>(
         .collect();
     let (steps, per) = (STEPS - delay, options.starts);
     let within = |feedback| -> Result<Vec<bool>> {
-        let options = GenerationOptions::new(steps, feedback).seed(seed + CLOSED_LOOP);
+        let options = GenerationOptions::new(steps, feedback).seed(closed_loop(seed, 1));
         let generated = generate(&learned.network, &starts, &options, engine)?;
         let judged = generated.iter().enumerate().map(|(k, one)| {
             let s = k / per;

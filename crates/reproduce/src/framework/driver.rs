@@ -25,7 +25,7 @@ use super::preset::Kind;
 use super::results::Results;
 use super::stop::{Result, Stop};
 use super::study::{Job, Learned, Study};
-use super::{overview, told};
+use super::{overview, printout};
 
 /// One job and its results.
 struct Done<S: Study> {
@@ -119,7 +119,7 @@ impl<S: Study> Reproduction<'_, S> {
             context.messages.say(&format!("{sentence}; the page speaks of the last good epoch"));
             ending = Ending::Diverged;
         }
-        Ok(Reproduced { ending, json: text, text: told::text(&metrics, folder.path()) })
+        Ok(Reproduced { ending, json: text, text: printout::text(&metrics, folder.path()) })
     }
 
     /// The folder of the whole reproduction.

@@ -15,7 +15,7 @@
 //! | [`job_result`], [`results`] | the results of one job, and of all of them |
 //! | [`measure`], [`comparison`], [`verdict`], [`table`] | what is made of it |
 //! | [`shapes`] | what figures of several studies are made from |
-//! | [`metrics`], [`told`], [`overview`] | how it is shown: as JSON, as text, as a page |
+//! | [`metrics`], [`printout`], [`overview`] | how it is shown: as JSON, as text, as a page |
 //! | [`options`], [`context`], [`stop`] | what a reproduction is asked and given, and how it ends early |
 
 pub mod comparison;
@@ -30,6 +30,7 @@ pub mod metrics;
 pub mod options;
 pub mod overview;
 pub mod preset;
+pub mod printout;
 pub mod results;
 pub mod shapes;
 pub mod stop;
@@ -37,8 +38,10 @@ pub mod study;
 pub mod table;
 #[cfg(test)]
 mod tests;
-pub mod told;
+
 pub mod verdict;
+
+use scrnn::streams::{Purpose, derived_seed};
 
 pub use comparison::Comparison;
 pub use condition::Condition;
@@ -53,9 +56,17 @@ pub use study::{Job, Learned, Study};
 pub use table::{Cell, Column, Table};
 pub use verdict::Verdict;
 
-/// Added to a seed for data that were not learned.
-pub const HELD_OUT: u64 = 1_000_000;
+/// The seed of data that were not learned; a study numbers its sets.
+pub fn held_out(seed: u64, set: u64) -> u64 {
+    derived_seed(seed, Purpose::HeldOut, set)
+}
 
-/// Added to a seed for the noise of closed loops: generators with the same seed draw the same numbers, and a closed loop
-/// should not meet the noise that it learned from.
-pub const CLOSED_LOOP: u64 = 2_000_000;
+/// The seed of the noise that closed loops are run with; a study numbers its kinds of them.
+pub fn closed_loop(seed: u64, kind: u64) -> u64 {
+    derived_seed(seed, Purpose::StudyLoops, kind)
+}
+
+/// The seed of a trial in a world; a study numbers its trials.
+pub fn in_trial(seed: u64, trial: u64) -> u64 {
+    derived_seed(seed, Purpose::StudyTrials, trial)
+}

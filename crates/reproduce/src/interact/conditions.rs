@@ -4,9 +4,10 @@ use std::path::Path;
 
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::jobs::side_by_side;
+use scrnn::streams::Purpose;
 use scrnn_data::{self as files, Field};
 use scrnn_run::experiment::{Data, Experiment, ScalingChoice, ScalingName};
-use scrnn_sim::interaction::{CHANNELS, InteractionOptions, random_order, record};
+use scrnn_sim::interact::{CHANNELS, InteractionOptions, random_order, record};
 use scrnn_tasks::interact::{self, BRANCHES};
 
 use crate::framework::options::Options;
@@ -125,8 +126,8 @@ fn drawn(left: f64, seed: u64, threads: usize, begin: impl Fn(usize) -> Result<(
     let options = InteractionOptions::default();
     let rows = side_by_side(sequences, threads, |k, _| -> Result<Sequence> {
         begin(k)?;
-        let seed = seed.wrapping_add((k as u64) << 32);
-        let mut sequence = record(&random_order(BRANCHES, left, seed), &options, seed, steps, |_, _| {})?;
+        let order = random_order(BRANCHES, left, seed, Purpose::RecordingOrders, k as u64);
+        let mut sequence = record(&order, &options, (seed, k as u64), steps, |_, _| {})?;
         // An order may come twice; a table tells sequences apart by their names.
         sequence.name = format!("{} {}", sequence.name, k + 1);
         Ok(sequence)

@@ -4,10 +4,10 @@ use scrnn::analysis::principal_components::PrincipalComponents;
 use scrnn::dataset::Sequence;
 use scrnn::error_regression::ErrorRegressionOptions;
 use scrnn::generation::Generated;
-use scrnn_sim::follower::Followed;
-use scrnn_sim::interaction::branchings;
+use scrnn_sim::interact::Followed;
+use scrnn_sim::interact::branchings;
 
-use super::trials::Subject;
+use super::trials::{SHOWN_LOOP, Subject};
 use super::world::{SHOWN, Snapshot};
 use crate::framework::Result;
 use scrnn_report::{Chart, Figure, Panel, Series, Tone};
@@ -45,7 +45,7 @@ impl Material {
     pub fn of(condition: &'static str, subject: &Subject<'_>) -> Result<Self> {
         let shown = subject.data.sequences().iter().position(|one| one.name == SHOWN).unwrap_or(0);
         subject.desk.at(|| "what is drawn".to_owned())?;
-        let closed = subject.on_its_own(|s| s, subject.seed, true)?.swap_remove(shown);
+        let closed = subject.on_its_own(|s| s, SHOWN_LOOP, true)?.swap_remove(shown);
         let state = subject.states.sequence(subject.other());
         let options = ErrorRegressionOptions::new(subject.data.channels().len());
         let quiet = {
@@ -60,7 +60,9 @@ impl Material {
         let of_slow = |s: usize| slow.iter().map(move |&i| (s, i));
         let sequences = subject.states.sequences();
         let states: Vec<f64> = (0..sequences).flat_map(of_slow).map(|(s, i)| subject.states.sequence(s)[i]).collect();
-        let variance = PrincipalComponents::of(&states, slow.len()).variances.iter().sum::<f64>() / slow.len() as f64;
+        let components = PrincipalComponents::of(&states, slow.len());
+        let variances = components.map(|components| components.variances).unwrap_or_default();
+        let variance = variances.iter().sum::<f64>() / slow.len() as f64;
         Ok(Self {
             condition,
             delay: topology.delay(),
@@ -135,7 +137,8 @@ fn figure(
 pub fn initial_states(materials: &[&Material]) -> Figure {
     let panels = materials.iter().map(|material| {
         let dimensions = material.states.len() / material.names.len();
-        let plane = PrincipalComponents::of(&material.states, dimensions).first(2);
+        let components = PrincipalComponents::of(&material.states, dimensions);
+        let plane = components.map(|components| components.first(2)).unwrap_or_default();
         let side = |letter: char| -> Vec<(f64, f64)> {
             let points = plane.chunks_exact(2).zip(&material.names);
             points.filter(|(_, name)| name.starts_with(letter)).map(|(point, _)| (point[0], point[1])).collect()
@@ -207,7 +210,7 @@ fn world_panels(title: &str, material: &Material, followed: &Followed) -> Vec<Pa
     let units = followed.steps.first().map_or(1, |moment| moment.context.len());
     let mut hands = vec![Series::line("", Tone::Ours, hand)];
     let hits =
-        |(k, moment): (usize, &scrnn_sim::follower::ControlStep)| moment.collision.map(|_| (k as f64, moment.hand));
+        |(k, moment): (usize, &scrnn_sim::interact::ControlStep)| moment.collision.map(|_| (k as f64, moment.hand));
     let hits: Vec<(f64, f64)> = followed.steps.iter().enumerate().filter_map(hits).collect();
     if !hits.is_empty() {
         hands.push(Series::dots("collision", Tone::Failed, hits));

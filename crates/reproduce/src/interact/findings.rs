@@ -1,7 +1,7 @@
 //! What is found for each network.
 
 use scrnn::error_regression::{Ascent, ErrorRegressionOptions};
-use scrnn_sim::interaction::ARM;
+use scrnn_sim::interact::ARM;
 use serde::Serialize;
 
 use super::Interact;

@@ -49,6 +49,10 @@ impl Study for Interact {
         "initial weights of its own, on the same recordings"
     }
 
+    fn edition(&self) -> u32 {
+        2
+    }
+
     fn conditions(&self, beyond: bool) -> Vec<Condition> {
         conditions::ALL.iter().filter(|one| beyond || one.of_thesis).map(|one| one.condition).collect()
     }
@@ -71,7 +75,7 @@ impl Study for Interact {
 
     fn evaluate(&self, job: &Job<'_>, desk: &Desk<'_>) -> Result<(Findings, Option<Material>)> {
         let (setting, learned) = (setting(job.condition.key), &job.networks[0]);
-        let scaled = learned.scaling.apply(&learned.source.data);
+        let scaled = learned.scaling.apply(&learned.source.data)?;
         let subject = Subject {
             network: &learned.network,
             states: &learned.initial_states,
@@ -103,7 +107,7 @@ impl Study for Interact {
     fn tables(&self, results: &Results<Findings>) -> Vec<Table> {
         let scans = results.jobs.iter().filter_map(|job| job.findings.regression.as_ref());
         let scans: Vec<&[(f64, f64)]> = scans.map(|one| one.scan.as_slice()).collect();
-        scan::table(scrnn_sim::interaction::CHANNELS.len(), &scans).into_iter().collect()
+        scan::table(scrnn_sim::interact::CHANNELS.len(), &scans).into_iter().collect()
     }
 
     fn verdicts(&self, results: &Results<Findings>) -> Vec<Verdict> {

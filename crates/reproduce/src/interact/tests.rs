@@ -9,7 +9,7 @@ use scrnn::initialization::initialize;
 use scrnn::scaling::Scaling;
 use scrnn_run::interrupt::Interrupt;
 use scrnn_run::messages::Silent;
-use scrnn_sim::interaction::{CHANNELS, InteractionOptions, parse_order, record, samples};
+use scrnn_sim::interact::{CHANNELS, InteractionOptions, parse_order, record, samples};
 
 use super::*;
 use crate::framework::kept::Kept;
@@ -19,10 +19,10 @@ use crate::framework::stop::Stop;
 /// One interaction, and how it is scaled.
 fn recorded() -> (Dataset, Scaling) {
     let order = parse_order(trials::OTHER).unwrap();
-    let sequence = record(&order, &InteractionOptions::default(), 1, samples(&order), |_, _| {}).unwrap();
+    let sequence = record(&order, &InteractionOptions::default(), (1, 0), samples(&order), |_, _| {}).unwrap();
     let data = Dataset::new(CHANNELS.map(String::from).to_vec(), vec![sequence]).unwrap();
     let scaling = Scaling::fit(&data, Scaling::RANGE);
-    (scaling.apply(&data), scaling)
+    (scaling.apply(&data).unwrap(), scaling)
 }
 
 #[test]

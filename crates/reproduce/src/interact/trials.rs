@@ -12,17 +12,21 @@ use scrnn::generation::{Feedback, Generated, GenerationOptions, Start, generate}
 use scrnn::initial_states::InitialStates;
 use scrnn::network::Network;
 use scrnn::scaling::Scaling;
-use scrnn_sim::interaction::{ARM, arm_postures, branchings, primitive_len};
+use scrnn_sim::interact::{ARM, arm_postures, branchings, primitive_len};
 use scrnn_tasks::interact::BRANCHES;
 use serde::{Deserialize, Serialize};
 
-use crate::framework::{Desk, Result};
+use crate::framework::{Desk, Result, closed_loop};
 
 /// The order whose state stands for one that does not correspond (5.3.3).
 pub const OTHER: &str = "LLRRL";
-/// Keeps noise of different uses apart.
-const OWN_STATES: u64 = 1 << 40;
-const ONE_STATE: u64 = 2 << 40;
+/// Kinds of closed loops.
+const OWN_STATES: u64 = 0;
+const ONE_STATE: u64 = 1;
+/// The loop that figures show,
+pub const SHOWN_LOOP: u64 = 2;
+/// and predictions that are fed back, whose noise is off.
+const FED: u64 = 3;
 /// A channel that tells the arm's side: the shoulder's roll.
 const TELLTALE: usize = 5;
 /// How much longer than the data a closed loop may take for its order.
@@ -109,7 +113,7 @@ impl Subject<'_> {
     }
 
     /// Runs with the network's own noise (2.25b), a bit longer than the data.
-    pub fn on_its_own(&self, state: impl Fn(usize) -> usize, seed: u64, contexts: bool) -> Result<Vec<Generated>> {
+    pub fn on_its_own(&self, state: impl Fn(usize) -> usize, kind: u64, contexts: bool) -> Result<Vec<Generated>> {
         let n = self.data.channels().len();
         let known = self.network.topology().delay() * n;
         let starts: Vec<Start<'_>> = (0..self.data.sequences().len())
@@ -120,7 +124,9 @@ impl Subject<'_> {
             .collect();
         let longest = self.data.sequences().iter().map(|sequence| sequence.len()).max().unwrap_or(0);
         let steps = (PATIENCE * longest as f64) as usize;
-        let options = GenerationOptions::new(steps, Feedback::closed(n, true)).seed(seed).contexts(contexts);
+        let options = GenerationOptions::new(steps, Feedback::closed(n, true))
+            .seed(closed_loop(self.seed, kind))
+            .contexts(contexts);
         Ok(generate(self.network, &starts, &options, self.desk.engine())?)
     }
 
@@ -134,10 +140,10 @@ impl Subject<'_> {
 
     /// 5.3.1.
     pub fn closed_loop(&self) -> Result<ClosedLoop> {
-        let own = self.on_its_own(|s| s, self.seed ^ OWN_STATES, false)?;
+        let own = self.on_its_own(|s| s, OWN_STATES, false)?;
         self.desk.go_on()?;
         let other = self.other();
-        let from_one = self.on_its_own(|_| other, self.seed ^ ONE_STATE, false)?;
+        let from_one = self.on_its_own(|_| other, ONE_STATE, false)?;
         let read = |list: &[Generated]| list.iter().map(|one| self.order_of(one)).collect::<Vec<_>>();
         let (orders, orders_from_one) = (read(&own), read(&from_one));
         let names = self.data.sequences().iter().map(|sequence| &sequence.name);
@@ -201,7 +207,7 @@ impl Subject<'_> {
             .collect();
         let longest = self.data.sequences().iter().map(|sequence| sequence.len()).max().unwrap_or(0);
         let steps = longest - self.network.topology().delay();
-        let options = GenerationOptions::new(steps, feedback).seed(self.seed);
+        let options = GenerationOptions::new(steps, feedback).seed(closed_loop(self.seed, FED));
         Ok(generate(self.network, &starts, &options, self.desk.engine())?)
     }
 
@@ -275,10 +281,10 @@ impl Subject<'_> {
                     next.extend_from_slice(regression.mean());
                 }
                 if k + 1 == delay {
-                    (0..delay - 1).for_each(|steps| ahead.extend_from_slice(regression.forecast_mean(steps)));
+                    ahead.extend((0..delay - 1).filter_map(|steps| regression.forecast_mean(steps)).flatten());
                 }
                 if k + 1 >= delay && k + delay < sequence.len() {
-                    ahead.extend_from_slice(regression.forecast_mean(delay - 1));
+                    ahead.extend(regression.forecast_mean(delay - 1).into_iter().flatten());
                 }
             }
             means.push(next);

@@ -2,8 +2,9 @@
 //! figures are drawn from.
 
 use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions};
-use scrnn_sim::follower::{Branch, Controller, Followed, Outcome, follow, with_own_arm};
-use scrnn_sim::interaction::{Interaction, InteractionOptions, parse_order, random_order};
+use scrnn::streams::Purpose;
+use scrnn_sim::interact::{Branch, Controller, Followed, Outcome, follow, with_own_arm};
+use scrnn_sim::interact::{Interaction, InteractionOptions, parse_order, random_order};
 use scrnn_tasks::interact::BRANCHES;
 use serde::Serialize;
 
@@ -12,6 +13,8 @@ use crate::framework::Result;
 
 /// The order of the figures (5.3.2).
 pub const SHOWN: &str = "RLLLR";
+/// The seed of the interactions that all networks meet: the same orders, with the same noise of the sensors.
+const SAME: u64 = 0;
 /// Samples to look ahead in Fig. 5.10.
 const AHEAD: usize = 40;
 
@@ -86,8 +89,8 @@ impl Subject<'_> {
         let mut branches = Vec::new();
         for trial in 0..trials {
             branches.extend(self.desk.part(&format!("{what}, interaction {}", trial + 1), || {
-                let order = random_order(BRANCHES, 0.5, trial);
-                let mut interaction = Interaction::new(&order, &InteractionOptions::default(), trial)?;
+                let order = random_order(BRANCHES, 0.5, SAME, Purpose::TrialOrders, trial);
+                let mut interaction = Interaction::new(&order, &InteractionOptions::default(), SAME, trial)?;
                 Ok(self.follow(state, &options, &mut interaction, |_| {})?.branches)
             })?);
         }
@@ -98,15 +101,15 @@ impl Subject<'_> {
     pub fn shown(&self, state: &[f64], options: &ErrorRegressionOptions) -> Result<(Followed, Vec<Snapshot>)> {
         let mut options = with_own_arm(options.clone());
         options.ahead = AHEAD;
-        let mut interaction = Interaction::new(&parse_order(SHOWN)?, &InteractionOptions::default(), self.seed)?;
+        let mut interaction = Interaction::new(&parse_order(SHOWN)?, &InteractionOptions::default(), self.seed, 0)?;
         let mut snapshots = Vec::new();
         let followed = self.follow(state, &options, &mut interaction, |regression| {
             let window = regression.window();
             let past = 0..window;
-            let mut means: Vec<Vec<f64>> = past.clone().map(|k| regression.smoothed_mean(k).to_vec()).collect();
-            let mut contexts: Vec<Vec<f64>> = past.map(|k| regression.context(k).to_vec()).collect();
-            means.extend((0..=AHEAD).map(|k| regression.forecast_mean(k).to_vec()));
-            contexts.extend((0..=AHEAD).map(|k| regression.forecast_context(k).to_vec()));
+            let rows = |k: usize| Some((regression.smoothed_mean(k)?.to_vec(), regression.context(k)?.to_vec()));
+            let to_come =
+                |k: usize| Some((regression.forecast_mean(k)?.to_vec(), regression.forecast_context(k)?.to_vec()));
+            let (means, contexts) = past.filter_map(rows).chain((0..=AHEAD).filter_map(to_come)).unzip();
             snapshots.push(Snapshot { window, means, contexts, tail: regression.tail().to_vec() });
         })?;
         Ok((followed, snapshots))

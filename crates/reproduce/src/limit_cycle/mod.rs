@@ -13,7 +13,7 @@ use scrnn_tasks::limit_cycle::{self, State};
 use serde::Serialize;
 
 use crate::framework::preset::asset;
-use crate::framework::{CLOSED_LOOP, Condition, Desk, HELD_OUT, Job, Kind, Measure, Result, Results, Study, Verdict};
+use crate::framework::{Condition, Desk, Job, Kind, Measure, Result, Results, Study, Verdict, closed_loop, held_out};
 
 /// The S-CTRNN of the noise-driven oscillator.
 const OSCILLATOR: Kind =
@@ -74,6 +74,10 @@ impl Study for LimitCycle {
         "An oscillator driven by noise that depends on its state"
     }
 
+    fn edition(&self) -> u32 {
+        2
+    }
+
     fn conditions(&self, _beyond: bool) -> Vec<Condition> {
         vec![Condition::only(&[OSCILLATOR])]
     }
@@ -85,7 +89,7 @@ impl Study for LimitCycle {
         let (delay, sequences) = (network.topology().delay(), data.sequences().len());
         let steps = data.sequences().iter().map(|sequence| sequence.len()).max().unwrap_or(0);
         let make = |steps, seed| limit_cycle::generate(&limit_cycle::Options { sequences, steps }, seed);
-        let (own, new) = (make(steps, seed)?, make(STEPS, seed + HELD_OUT)?);
+        let (own, new) = (make(steps, seed)?, make(STEPS, held_out(seed, 0))?);
 
         // New sequences have other phases: the network first listens to find where each of them starts.
         let options = RecognitionOptions::with(|it| {
@@ -102,12 +106,13 @@ impl Study for LimitCycle {
         let found: Vec<&[f64]> = found.iter().map(Vec::as_slice).collect();
         let on_learned = assessment::open_loop(network, &learned.states(), data, engine)?;
         let on_new = assessment::open_loop(network, &found, &new.task.data, engine)?;
-        let run = |steps, contexts| {
-            let options =
-                GenerationOptions::new(steps, Feedback::closed(1, true)).seed(seed + CLOSED_LOOP).contexts(contexts);
+        let run = |kind, steps, contexts| {
+            let options = GenerationOptions::new(steps, Feedback::closed(1, true))
+                .seed(closed_loop(seed, kind))
+                .contexts(contexts);
             assessment::run(network, &learned.states(), data, &options, engine)
         };
-        let closed = run(STEPS, true)?;
+        let closed = run(0, STEPS, true)?;
 
         // The deviation of each predicted sample follows from the sample before: a recorded or a generated one.
         let agree = |generated: &[Generated], before: &dyn Fn(usize, usize) -> f64, steps: &dyn Fn(usize) -> usize| {
@@ -138,9 +143,9 @@ impl Study for LimitCycle {
             }),
             sd_correlation_open: agree(&on_learned, &|s, k| recorded(data, s, k), &|s| length(data, s)),
             sd_correlation_closed: agree(&closed, &before_own, &|_| STEPS),
-            network: desk.part("swings of the network on its own", || Ok(swings(&run(LONG, false)?)))?,
+            network: desk.part("swings of the network on its own", || Ok(swings(&run(1, LONG, false)?)))?,
             oscillator: desk
-                .part("swings of the oscillator", || Ok(swings_of(&make(LONG, seed + HELD_OUT)?.task.data)))?,
+                .part("swings of the oscillator", || Ok(swings_of(&make(LONG, held_out(seed, 1))?.task.data)))?,
             learned: swings_of(data),
             assessment,
         };

@@ -1,9 +1,9 @@
 //! What is found for the networks of one seed, and what figures are drawn from.
 
-use scrnn_sim::agent::Performance;
-use scrnn_sim::channels::{REACHING, VISION};
-use scrnn_sim::reaching::POSITIONS;
-use scrnn_sim::tutor::Demonstration;
+use scrnn_sim::reach::agent::Performance;
+use scrnn_sim::reach::channels::{REACHING, VISION};
+use scrnn_sim::reach::stage::POSITIONS;
+use scrnn_sim::reach::tutor::Demonstration;
 use serde::Serialize;
 
 use super::trials::{Found, Given, Shifted, pooled_spread_ratio};

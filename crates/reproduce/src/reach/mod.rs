@@ -8,13 +8,13 @@ mod trials;
 mod variance;
 mod variance_page;
 
-use scrnn_sim::agent::{Noise, Performance};
-use scrnn_sim::channels::REACHING;
-use scrnn_sim::nao;
-use scrnn_sim::reaching::{POSITIONS, gaze_at, places_between};
+use scrnn_sim::reach::agent::{Noise, Performance};
+use scrnn_sim::reach::channels::REACHING;
+use scrnn_sim::reach::stage::{POSITIONS, gaze_at, places_between};
+use scrnn_sim::robot::nao;
 
 use crate::framework::preset::asset;
-use crate::framework::{Condition, Desk, Job, Kind, Measure, Result, Results, Study, Verdict};
+use crate::framework::{Condition, Desk, Job, Kind, Measure, Result, Results, Study, Verdict, in_trial};
 use findings::{Driven, Findings, Material};
 use scrnn_report::Section;
 use scrnn_run::assessment;
@@ -42,8 +42,8 @@ const FIRST_SHIFT: usize = 48;
 /// The driver of the figures: the network with the noise that it predicts.
 const WITH_NOISE: &str = "noise";
 
-/// Sets the noise of performances apart from other numbers of a seed.
-const NOISE: u64 = 1000;
+/// Number of the first trial whose sphere is shifted; those before it are one for each place.
+const FIRST_SHIFTED: u64 = 100;
 
 /// The experiment.
 #[derive(Debug)]
@@ -106,6 +106,10 @@ impl Study for Reach {
         "NAO learns to reach"
     }
 
+    fn edition(&self) -> u32 {
+        2
+    }
+
     fn conditions(&self, _beyond: bool) -> Vec<Condition> {
         vec![Condition::only(&[TAUGHT, TAUGHT_EXACTLY])]
     }
@@ -116,7 +120,7 @@ impl Study for Reach {
         let learned = &networks[0];
         let demonstrations = &learned.source.demonstrations;
         let scaling = &learned.scaling;
-        let scaled = scaling.apply(&learned.source.data);
+        let scaled = scaling.apply(&learned.source.data)?;
         let open = assessment::open_loop(&learned.network, &learned.states(), &scaled, engine)?;
         let n = REACHING.len();
         let mean_variance = |channel: usize| {
@@ -135,7 +139,7 @@ impl Study for Reach {
             let trial = |(place, &y): (usize, &f64)| Trial {
                 who: who.clone(),
                 performance: Performance { frozen, ..still(y, cycles) },
-                seed: seed + NOISE * (1 + place as u64),
+                seed: in_trial(seed, place as u64),
                 pictures: key == WITH_NOISE && place < POSITIONS.len(),
             };
             let trials: Vec<Trial> = places.iter().enumerate().map(trial).collect();
@@ -162,7 +166,7 @@ impl Study for Reach {
             let performance =
                 Performance { shift, samples: at + samples(self.after_shift), ..still(POSITIONS[from], 0) };
             let who = Who::Network { index: 0, noise: Noise::Predicted };
-            Trial { who, performance, seed: seed + NOISE * (100 + k as u64), pictures: false }
+            Trial { who, performance, seed: in_trial(seed, FIRST_SHIFTED + k as u64), pictures: false }
         };
         let trials: Vec<Trial> = SHIFTS.iter().enumerate().map(shift).collect();
         let shifted: Played<Option<Shifted>> = desk.part("shifts of the sphere", || {
@@ -176,7 +180,7 @@ impl Study for Reach {
         let variance = by_phase(demonstrations, &scaled, &open, &driving, scaling.scale());
         speeds.sort_by(f64::total_cmp);
         let demonstrated = demonstrations.iter().map(|one| {
-            let expected = one.samples.len() / n / scrnn_sim::reaching::CYCLE;
+            let expected = one.samples.len() / n / scrnn_sim::reach::stage::CYCLE;
             Found::of(one.y, expected, &one.cycles)
         });
         let findings = Findings {

@@ -1,11 +1,11 @@
 //! Figures and tables of the reaching experiment, in the thesis' order.
 
-use scrnn_sim::agent::Decision;
-use scrnn_sim::channels::{REACHING, VISION};
-use scrnn_sim::reaching::{CYCLE, PERIOD, POSITIONS};
-use scrnn_sim::scene::Scene;
-use scrnn_sim::touching::{Cycle, HandState};
-use scrnn_sim::tutor::Demonstration;
+use scrnn_sim::reach::agent::Decision;
+use scrnn_sim::reach::channels::{REACHING, VISION};
+use scrnn_sim::reach::stage::{CYCLE, PERIOD, POSITIONS};
+use scrnn_sim::reach::touching::{Cycle, HandState};
+use scrnn_sim::reach::tutor::Demonstration;
+use scrnn_sim::world::scene::Scene;
 
 use super::findings::{Driven, Findings, Material, channel};
 use super::trials::{Found, Given, decided};

@@ -3,15 +3,15 @@
 use scrnn::analysis::mixture::{GaussianMixture, MixtureOptions};
 use scrnn::engine::Engine;
 use scrnn::jobs::side_by_side;
-use scrnn_sim::agent::{
+use scrnn_sim::reach::agent::{
     Decision, Driver, MixtureDriver, NetworkDriver, Noise, Performance, Performed, Replay, Snapshot, perform,
 };
-use scrnn_sim::channels::{REACHING, VISION};
-use scrnn_sim::reaching::{CYCLE, PERIOD, POSITIONS};
-use scrnn_sim::scene::Scene;
-use scrnn_sim::touching::{Cycle, spread};
-use scrnn_sim::tutor::Demonstration;
+use scrnn_sim::reach::channels::{REACHING, VISION};
+use scrnn_sim::reach::stage::{CYCLE, PERIOD, POSITIONS};
+use scrnn_sim::reach::touching::{Cycle, spread};
+use scrnn_sim::reach::tutor::Demonstration;
 use scrnn_sim::world::WorldOptions;
+use scrnn_sim::world::scene::Scene;
 use serde::{Deserialize, Serialize};
 
 use super::processor_time::ProcessorTime;
@@ -124,9 +124,9 @@ impl<'a> Company<'a> {
         let mut pictures = Vec::new();
         let clock = ProcessorTime::start();
         let mut look = |glimpse: &Snapshot<'_>| -> Result<()> {
-            let time = glimpse.stage.world.time();
+            let time = glimpse.stage.world().time();
             if trial.pictures && glimpse.decision.is_none() && time + 1e-9 > 0.1 * (pictures.len() + 1) as f64 {
-                pictures.push((time, glimpse.stage.world.scene()));
+                pictures.push((time, glimpse.stage.world().scene()));
             }
             Ok(())
         };

@@ -3,11 +3,11 @@
 use scrnn::dataset::Dataset;
 use scrnn::evaluation::correlation;
 use scrnn::generation::Generated;
-use scrnn_sim::agent::Decision;
-use scrnn_sim::channels::{REACHING, VISION};
-use scrnn_sim::reaching::{CYCLE, PERIOD};
-use scrnn_sim::touching::Cycle;
-use scrnn_sim::tutor::Demonstration;
+use scrnn_sim::reach::agent::Decision;
+use scrnn_sim::reach::channels::{REACHING, VISION};
+use scrnn_sim::reach::stage::{CYCLE, PERIOD};
+use scrnn_sim::reach::touching::Cycle;
+use scrnn_sim::reach::tutor::Demonstration;
 use serde::Serialize;
 
 /// Samples of a movement's beginning that are left out: the network has seen too little yet.
@@ -151,7 +151,7 @@ fn rank_correlation(a: &[f64], b: &[f64]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use scrnn_sim::touching::HandState;
+    use scrnn_sim::reach::touching::HandState;
 
     #[test]
     fn phases_count_from_the_nearest_touch() {

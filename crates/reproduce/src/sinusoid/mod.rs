@@ -12,7 +12,7 @@ use serde::Serialize;
 use crate::framework::preset::asset;
 use crate::framework::shapes::over_time;
 use crate::framework::{
-    CLOSED_LOOP, Condition, Desk, HELD_OUT, Job, JobResult, Kind, Measure, Result, Results, Study, Verdict,
+    Condition, Desk, Job, JobResult, Kind, Measure, Result, Results, Study, Verdict, closed_loop, held_out,
 };
 
 /// The S-CTRNN of the sine wave.
@@ -60,6 +60,10 @@ impl Study for Sinusoid {
         "A sine wave with noise that changes over time"
     }
 
+    fn edition(&self) -> u32 {
+        2
+    }
+
     fn conditions(&self, _beyond: bool) -> Vec<Condition> {
         vec![Condition::only(&[WAVE])]
     }
@@ -70,8 +74,8 @@ impl Study for Sinusoid {
         let (network, data) = (&learned.network, &learned.source.data);
         let delay = network.topology().delay();
         let ideal = make(TaskName::Sinusoid, (1, STEPS + delay), seed, 1)?;
-        let new = make(TaskName::Sinusoid, (1, STEPS), seed + HELD_OUT, 1)?;
-        let options = GenerationOptions::new(STEPS, Feedback::closed(1, true)).seed(seed + CLOSED_LOOP);
+        let new = make(TaskName::Sinusoid, (1, STEPS), held_out(seed, 0), 1)?;
+        let options = GenerationOptions::new(STEPS, Feedback::closed(1, true)).seed(closed_loop(seed, 0));
         let closed = assessment::run(network, &learned.states(), data, &options, engine)?.remove(0);
         let open = |data: &Dataset| assessment::open_loop(network, &learned.states(), data, engine);
         let (on_learned, on_new) = (open(data)?, open(&new.data)?);

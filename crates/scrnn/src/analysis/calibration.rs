@@ -32,13 +32,13 @@ pub struct Bin {
 }
 
 impl Calibration {
-    /// Of errors and variances in pairs, in at most `bins` groups of equal size. None if there are no pairs.
-    ///
-    /// # Panics
-    /// If the lists have different lengths.
+    /// Of errors and variances in pairs, in at most `bins` groups of equal size. None if there are no pairs, or if the
+    /// lists differ in length.
     #[must_use]
     pub fn of(errors: &[f64], variances: &[f64], bins: usize) -> Option<Self> {
-        assert_eq!(errors.len(), variances.len(), "each error has its variance");
+        if errors.len() != variances.len() {
+            return None;
+        }
         let mut pairs: Vec<(f64, f64)> = variances.iter().copied().zip(errors.iter().copied()).collect();
         pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
         let n = pairs.len() as f64;
@@ -77,6 +77,7 @@ mod tests {
         let bins: Vec<(f64, f64)> = found.bins.iter().map(|bin| (bin.predicted, bin.observed)).collect();
         assert_eq!(bins, [(1.0, 1.25_f64.sqrt()), (2.0, 4.5_f64.sqrt())]);
         assert_eq!(Calibration::of(&[], &[], 4), None);
+        assert_eq!(Calibration::of(&[0.5], &[1.0, 1.0], 4), None);
     }
 
     #[test]

@@ -122,6 +122,8 @@ fn within_one<S: Simd>(simd: S, y: S::f64s) -> S::f64s {
 #[inline(always)]
 pub fn tanh_rows<S: Simd>(simd: S, u: &[f64], c: &mut [f64]) {
     match S::F64_LANES {
+        // Without vector registers, groups of many vectors are only code to compile. Who shares a division is the same.
+        8 if S::REGISTER_COUNT < 16 => groups::<S, 2, 2, 1>(simd, u, c),
         8 => groups::<S, 8, 2, 1>(simd, u, c),
         4 => groups::<S, 4, 4, 2>(simd, u, c),
         _ => groups::<S, 8, 8, 4>(simd, u, c),

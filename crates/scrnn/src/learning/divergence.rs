@@ -84,9 +84,9 @@ impl Divergence {
 fn place(network: &Network, u0: &[f64], data: &Dataset, s: usize) -> (Option<usize>, &'static str) {
     let sequence = &data.sequences()[s];
     let delay = network.topology.delay();
-    let mut state = Plain::new(network, u0);
+    let mut state = Plain::at(network, u0);
     for step in 0..sequence.len() - delay {
-        state.step(sequence.sample(step));
+        state.advance(sequence.sample(step));
         let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
         if !finite(&state.u) {
             return (Some(step), "context");

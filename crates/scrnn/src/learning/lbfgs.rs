@@ -6,8 +6,7 @@
 use super::batches::Batches;
 use super::non_centred::NonCentred;
 use super::plan::Lbfgs;
-use super::state::Fields;
-use super::state::OptimiserState;
+use super::state::{Fields, OptimiserState, StateTensor};
 use crate::error::{Error, Result};
 use crate::initial_states::InitialStates;
 use crate::parameters::Parameters;
@@ -188,7 +187,13 @@ impl LbfgsRule {
     /// # Errors
     /// [`Error::Checkpoint`] if a part is missing, of another size, or counts pairs that cannot be there.
     pub fn load(&mut self, state: &OptimiserState) -> Result<()> {
-        Fields { tensors: vec![], numbers: self.fields().numbers }.load(state)?;
+        let numbers = vec![
+            (HELD, &mut self.held),
+            (NEXT, &mut self.next),
+            (STEP, &mut self.step),
+            (CONVERGED, &mut self.converged),
+        ];
+        Fields { tensors: vec![], numbers }.load(state)?;
         let memory = self.memory as f64;
         // Until all rows are there, the next is the one after the last.
         let nexts = if self.held < memory { self.held..=self.held } else { 0.0..=memory - 1.0 };
@@ -221,24 +226,23 @@ impl LbfgsRule {
         Ok(())
     }
 
-    /// What has to be kept to go on.
-    pub fn fields(&mut self) -> Fields<'_> {
-        let shape = vec![self.pairs.held(), self.at.len()];
-        self.held = self.pairs.held() as f64;
+    /// Adds what has to be kept to go on. The memory is large: it is copied once, into the state.
+    pub fn save(&self, state: &mut OptimiserState) {
+        let held = self.pairs.held();
         let (moves, changes, next) = self.pairs.rows();
-        self.next = next as f64;
-        Fields {
-            tensors: vec![(MOVES, shape.clone(), moves), (CHANGES, shape, changes)],
-            numbers: vec![
-                ("lbfgs.held", &mut self.held),
-                ("lbfgs.next", &mut self.next),
-                ("lbfgs.step", &mut self.step),
-                ("lbfgs.converged", &mut self.converged),
-            ],
+        for (name, values) in [(MOVES, moves), (CHANGES, changes)] {
+            let shape = vec![held, self.at.len()];
+            state.tensors.push(StateTensor { name: name.to_owned(), shape, values: values.to_vec() });
         }
+        let numbers = [(HELD, held as f64), (NEXT, next as f64), (STEP, self.step), (CONVERGED, self.converged)];
+        state.numbers.extend(numbers.map(|(name, value)| (name.to_owned(), value)));
     }
 }
 
+const HELD: &str = "lbfgs.held";
+const NEXT: &str = "lbfgs.next";
+const STEP: &str = "lbfgs.step";
+const CONVERGED: &str = "lbfgs.converged";
 const MOVES: &str = "lbfgs.moves";
 const CHANGES: &str = "lbfgs.changes";
 
@@ -252,6 +256,12 @@ enum Point {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn saved(rule: &LbfgsRule) -> OptimiserState {
+        let mut state = OptimiserState::default();
+        rule.save(&mut state);
+        state
+    }
     use crate::dataset::{Dataset, Sequence};
     use crate::engine::Engine;
     use crate::initialization::initialize;
@@ -387,25 +397,25 @@ mod tests {
         batches.evaluate(&parameters, &states);
         let len = rule.at.len();
         for update in 0..7 {
-            let saved = rule.fields().save();
+            let kept = saved(&rule);
             let held = rule.pairs.held();
             assert_eq!(held, update.min(4));
-            for tensor in &saved.tensors {
+            for tensor in &kept.tensors {
                 assert_eq!((&tensor.shape[..], tensor.values.len()), (&[held, len][..], held * len));
             }
             // As earlier versions wrote it: rows for all pairs that there can be.
-            let mut earlier = saved.clone();
+            let mut earlier = kept.clone();
             for tensor in &mut earlier.tensors {
                 tensor.shape[0] = 4;
                 tensor.values.resize(4 * len, 0.0);
             }
             let mut after = Vec::new();
-            for state in [&saved, &earlier] {
+            for state in [&kept, &earlier] {
                 let (mut other, mut own_batches, mut own_parameters, mut own_states) = problem(0.3);
                 own_parameters.clone_from(&parameters);
                 own_states.clone_from(&states);
                 other.load(state).unwrap();
-                assert_eq!(other.fields().save(), saved);
+                assert_eq!(saved(&other), kept);
                 own_batches.evaluate(&own_parameters, &own_states);
                 other.ascend(&mut own_batches, &mut own_parameters, &mut own_states);
                 after.push((own_parameters, own_states));
@@ -415,7 +425,7 @@ mod tests {
                 assert_eq!((&own_parameters, &own_states), (&parameters, &states), "update {update}");
             }
         }
-        let mut strange = rule.fields().save();
+        let mut strange = saved(&rule);
         strange.tensors[1].shape[0] = 3;
         strange.tensors[1].values.truncate(3 * len);
         let told = problem(0.3).0.load(&strange).unwrap_err().to_string();

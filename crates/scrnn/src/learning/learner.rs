@@ -301,11 +301,8 @@ impl Learner {
         if self.evaluated {
             self.batches.save(&mut state);
         }
-        if self.has_refined() {
-            let lbfgs = self.lbfgs.clone().map(|mut lbfgs| lbfgs.fields().save());
-            let OptimiserState { tensors, numbers } = lbfgs.unwrap_or_default();
-            state.tensors.extend(tensors);
-            state.numbers.extend(numbers);
+        if let Some(lbfgs) = self.lbfgs.as_ref().filter(|_| self.has_refined()) {
+            lbfgs.save(&mut state);
         }
         state
     }

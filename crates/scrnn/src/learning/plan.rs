@@ -6,8 +6,8 @@ use crate::error::{Error, Result};
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Plan {
-    /// Passes through the data; each is one update, but for Adam in batches. An epoch of L-BFGS is an update, and now and then more
-    /// than one pass.
+    /// Passes through the data; each is one update, but for Adam in batches. An epoch of L-BFGS is one update, which
+    /// may take several passes.
     pub epochs: u64,
     /// sigma^2_IS, the variance of the initial states around their mean (2.13). 0 makes all sequences share one initial state, the
     /// mean: only what a network hears then tells it which sequence it is in. Momentum needs one above 0.

@@ -522,7 +522,8 @@ fn what_is_missing_is_learned_around() {
     // Every fourth value, another one in each sequence.
     let punched = |s: usize, sequence: &Sequence| {
         let values = sequence.values().iter().enumerate();
-        Sequence::new("", 1, values.map(|(k, x)| if (k + s) % 4 == 0 { f64::NAN } else { *x }).collect()).unwrap()
+        Sequence::new("", 1, values.map(|(k, x)| if (k + s).is_multiple_of(4) { f64::NAN } else { *x }).collect())
+            .unwrap()
     };
     let sequences = whole.sequences().iter().enumerate().map(|(s, own)| punched(s, own)).collect();
     let data = Dataset::new(vec!["y".into()], sequences).unwrap();

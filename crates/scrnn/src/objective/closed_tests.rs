@@ -18,7 +18,7 @@ fn data(missing: bool) -> Dataset {
     let sequence = |s: usize, len: usize| {
         let value = |k: usize| {
             let (t, i) = ((k / 2) as f64, (k % 2) as f64);
-            if missing && (k * 7 + s * 3) % 5 == 0 {
+            if missing && (k * 7 + s * 3).is_multiple_of(5) {
                 return f64::NAN;
             }
             0.5 * (0.4 * t + i + s as f64).sin() + 0.2 * (1.3 * t + 2.0 * i).cos()
@@ -89,7 +89,7 @@ fn plain_closed(network: &Network, u0: &[f64], samples: &[f64], run: &Run, term:
     let (n, delay) = (2, network.topology.delay());
     let release = run.release.unwrap();
     let spread = |copy: &Plain<'_>, i: usize| copy.v.get(i).map_or(0.0, |v| v.sqrt());
-    let mut copies: Vec<Plain<'_>> = (0..term.copies).map(|_| Plain::new(network, u0)).collect();
+    let mut copies: Vec<Plain<'_>> = (0..term.copies).map(|_| Plain::at(network, u0)).collect();
     let mut random: Vec<_> =
         (0..term.copies).map(|copy| stream(release.seed, Purpose::ClosedLoopNoise, copy as u64)).collect();
     // [copy][step]: mean and spread.
@@ -106,7 +106,7 @@ fn plain_closed(network: &Network, u0: &[f64], samples: &[f64], run: &Run, term:
                     })
                     .collect(),
             };
-            copy.step(&x);
+            copy.advance(&x);
             made[c].push((0..n).map(|i| (copy.y[i], spread(copy, i))).collect());
         }
         let (ks, weight) = if k < release.step { (1, 1.0) } else { (term.copies, term.weight) };
@@ -155,7 +155,7 @@ fn values_are_those_of_plain_loops() {
                     let (samples, u0) = (data.sequences()[index].values(), &states[index * 7..(index + 1) * 7]);
                     let expected = match (run.release, term) {
                         (Some(_), Some(term)) => plain_closed(&network, u0, samples, run, term),
-                        _ => likelihood::plain(&network, u0, samples, run.steps),
+                        _ => likelihood::plain(&network, u0, samples, run.steps).unwrap(),
                     };
                     let name = format!("{name}, delay {delay}, missing {missing}, {term:?}, run {index}");
                     near(&name, found.ln_likelihood[index], expected.0, 1e-11);

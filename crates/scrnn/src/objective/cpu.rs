@@ -288,14 +288,16 @@ impl CpuObjective {
     fn evaluate_mixed(&mut self, runs: &[Run], initial: &[f64], want: Want, evaluation: &mut Evaluation) {
         let n_c = self.packed.n_c;
         let [mut taught, mut others] = std::mem::take(&mut self.ways);
-        (taught.clear(), others.clear());
+        taught.clear();
+        others.clear();
         for (index, run) in runs.iter().enumerate() {
             if self.is_taught(run) { &mut taught } else { &mut others }.push(index);
         }
         let mut found = self.found.take().unwrap_or_else(|| Box::new(Evaluation::new(&self.topology)));
         let (mut some, mut some_initial) = (std::mem::take(&mut self.some), std::mem::take(&mut self.some_initial));
         let mut take = |which: &[usize]| {
-            (some.clear(), some_initial.clear());
+            some.clear();
+            some_initial.clear();
             for &index in which {
                 some.push(runs[index]);
                 some_initial.extend_from_slice(&initial[index * n_c..(index + 1) * n_c]);

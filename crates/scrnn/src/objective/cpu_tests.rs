@@ -80,8 +80,9 @@ impl Case {
     /// ln L_out and ln L_all by the plain reference.
     fn ln_likelihood(&self, point: &Point, samples: &[Vec<f64>]) -> (f64, f64) {
         let runs = self.lengths.iter().zip(samples).enumerate();
-        let out: f64 =
-            runs.map(|(s, (&steps, x))| likelihood::plain(&point.network, point.states.sequence(s), x, steps).0).sum();
+        let out: f64 = runs
+            .map(|(s, (&steps, x))| likelihood::plain(&point.network, point.states.sequence(s), x, steps).unwrap().0)
+            .sum();
         (out, out + point.states.ln_prior(&point.network.topology, self.prior))
     }
 }
@@ -115,7 +116,7 @@ fn check(case: &Case) {
     let objective = evaluation(case, &Engine::serial());
 
     for (s, (x, &steps)) in samples.iter().zip(case.lengths).enumerate() {
-        let (plain, squared) = likelihood::plain(&point.network, point.states.sequence(s), x, steps);
+        let (plain, squared) = likelihood::plain(&point.network, point.states.sequence(s), x, steps).unwrap();
         assert!((plain - objective.ln_likelihood[s]).abs() <= 1e-12 * (1.0 + plain.abs()), "ln L of sequence {s}");
         assert!((squared - objective.squared_error[s]).abs() <= 1e-12 * (1.0 + squared), "error of sequence {s}");
     }

@@ -115,7 +115,7 @@ mod tests {
         let mut film = Film::new(&[("seed", "1")]).unwrap();
         for order in &all_orders(1) {
             film.begin(&letters(order)).unwrap();
-            record(order, &InteractionOptions::default(), 1, 40, |interaction, sample| {
+            record(order, &InteractionOptions::default(), (1, 0), 40, |interaction, sample| {
                 film.frame(interaction, sample, Some((&[0.0; 8], None))).unwrap();
             })
             .unwrap();
@@ -154,7 +154,8 @@ mod tests {
 
     #[test]
     fn a_film_tells_when_the_object_is_lost() {
-        let mut interaction = Interaction::new(&parse_order("L").unwrap(), &InteractionOptions::default(), 1).unwrap();
+        let mut interaction =
+            Interaction::new(&parse_order("L").unwrap(), &InteractionOptions::default(), 1, 0).unwrap();
         let mut film = Film::new(&[]).unwrap();
         film.begin("L").unwrap();
         interaction.turn_away();

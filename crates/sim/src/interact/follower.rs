@@ -146,7 +146,7 @@ pub fn follow<E: From<Error>>(
             object_in_view: interaction.object_in_view(),
             predicted,
             variance,
-            context: regression.context(regression.window()).to_vec(),
+            context: regression.context(regression.window()).unwrap_or_default().to_vec(),
             regression: done,
             error: arm_error(&to_scaled(arm), &to_scaled(tutor)),
             hand: levels.out(interaction.hand_place().y),
@@ -170,11 +170,11 @@ fn hand_levels() -> Result<Levels> {
     let robot = nao::load_one_armed()?;
     let effector = robot.link("r_effector")?;
     let place = |arm: [f64; 4]| {
-        let root_from_hand: Isometry3<f64> = robot.forward(&[&[0.0, 0.0][..], &arm].concat())[effector];
-        Point3::from(root_from_hand.translation.vector).y
+        let root_from_hand: Isometry3<f64> = robot.forward(&[&[0.0, 0.0][..], &arm].concat())?[effector];
+        Ok::<_, Error>(Point3::from(root_from_hand.translation.vector).y)
     };
-    let [centre, left, right] = arm_postures().map(place);
-    Ok(Levels { centre, left, right })
+    let [centre, left, right] = arm_postures();
+    Ok(Levels { centre: place(centre)?, left: place(left)?, right: place(right)? })
 }
 
 /// What became of each branching: a collision counts first, then a move to the wrong side that begins in its primitive.

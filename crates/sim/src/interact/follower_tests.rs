@@ -66,7 +66,7 @@ fn an_object_out_of_view_stays_where_it_was_seen_last_and_the_interaction_goes_o
     let options = with_own_arm(ErrorRegressionOptions::with(8, |it| {
         it.iterations = 1;
     }));
-    let mut interaction = Interaction::new(&parse_order("R").unwrap(), &InteractionOptions::default(), 5).unwrap();
+    let mut interaction = Interaction::new(&parse_order("R").unwrap(), &InteractionOptions::default(), 5, 0).unwrap();
     interaction.turn_away();
     let observe = |regression: &mut ErrorRegression, sample: &[f64]| regression.observe(sample, &mut || true);
     let followed = follow(&controller, &options, &mut interaction, observe, |_, _, _| Ok::<(), Error>(())).unwrap();
@@ -98,7 +98,7 @@ fn whoever_watches_can_end_an_interaction() {
     let options = with_own_arm(ErrorRegressionOptions::with(8, |it| {
         it.iterations = 0;
     }));
-    let mut interaction = Interaction::new(&parse_order("R").unwrap(), &InteractionOptions::default(), 5).unwrap();
+    let mut interaction = Interaction::new(&parse_order("R").unwrap(), &InteractionOptions::default(), 5, 0).unwrap();
     let observe = |regression: &mut ErrorRegression, sample: &[f64]| regression.observe(sample, &mut || true);
     let mut seen = 0;
     let ended = follow(&controller, &options, &mut interaction, observe, |_, _, _| {
@@ -119,7 +119,8 @@ fn the_loop_runs_from_sensors_to_arm_and_the_same_seed_gives_the_same_bits() {
     }));
     let observe = |regression: &mut ErrorRegression, sample: &[f64]| regression.observe(sample, &mut || true);
     let run = || {
-        let mut interaction = Interaction::new(&parse_order("R").unwrap(), &InteractionOptions::default(), 5).unwrap();
+        let mut interaction =
+            Interaction::new(&parse_order("R").unwrap(), &InteractionOptions::default(), 5, 0).unwrap();
         let mut commands = Vec::new();
         let followed = follow(&controller, &options, &mut interaction, observe, |_, _, regression| {
             commands.push(regression.mean()[ARM.start]);
@@ -138,7 +139,7 @@ fn the_loop_runs_from_sensors_to_arm_and_the_same_seed_gives_the_same_bits() {
     let stranger = Topology::s_ctrnn(2, 3, 2.0).unwrap();
     let (network, states) = initialize(&stranger, 1, 3);
     let controller = Controller { network: &network, initial_state: states.sequence(0), ..controller };
-    let mut interaction = Interaction::new(&[Side::Left], &InteractionOptions::default(), 5).unwrap();
+    let mut interaction = Interaction::new(&[Side::Left], &InteractionOptions::default(), 5, 0).unwrap();
     let refused = follow(&controller, &options, &mut interaction, observe, |_, _, _| Ok::<(), Error>(())).unwrap_err();
     assert!(refused.to_string().contains("channels holds 2 values; needed: 8"), "{refused}");
 }

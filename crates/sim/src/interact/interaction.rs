@@ -11,13 +11,13 @@ use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use scrnn::analysis::excursions::Side;
 use scrnn::dataset::Sequence;
+use scrnn::streams::{Purpose, stream};
 
 use super::order::{PERIOD, letters, out, samples};
 use crate::error::{Error, Result};
 use crate::robot::gaze::{Gaze, LaggingGaze};
 use crate::robot::joints::{HEAD, RIGHT_ARM};
 use crate::robot::nao;
-use crate::streams::{Purpose, stream};
 use crate::world::scene::{Part, Scene, Shape};
 use crate::world::{BodyId, JointState, Placement, RobotId, World, WorldOptions};
 
@@ -125,12 +125,12 @@ pub enum Collision {
 impl Interaction {
     /// Both robots with their arms in the centre; the head fixates the object. The sensors' noise is that of a trial: an
     /// interaction that is [recorded](record) with the same seed draws other numbers, so that no network meets the noise
-    /// that it has learned.
+    /// that it has learned. Trials of one seed differ in `index`.
     ///
     /// # Errors
     /// [`Error::Setting`] for senseless options.
-    pub fn new(order: &[Side], options: &InteractionOptions, seed: u64) -> Result<Self> {
-        Self::with_noise(order, options, stream(seed, Purpose::TrialNoise, 0))
+    pub fn new(order: &[Side], options: &InteractionOptions, seed: u64, index: u64) -> Result<Self> {
+        Self::with_noise(order, options, stream(seed, Purpose::TrialSensors, index))
     }
 
     fn with_noise(order: &[Side], options: &InteractionOptions, random: ChaCha8Rng) -> Result<Self> {
@@ -150,13 +150,13 @@ impl Interaction {
         let posture = |head: [f64; 2], arm: [f64; 4]| [&head[..], &arm].concat();
         let effector = robot.link("r_effector")?;
         let place = |world_from_root: &Isometry3<f64>, arm: [f64; 4], beyond: f64| {
-            let root_from_link = robot.forward(&posture([0.0, 0.0], arm));
-            world_from_root * root_from_link[effector] * Point3::new(beyond, 0.0, 0.0)
+            let root_from_link = robot.forward(&posture([0.0, 0.0], arm))?;
+            Ok::<_, Error>(world_from_root * root_from_link[effector] * Point3::new(beyond, 0.0, 0.0))
         };
         let gaze = Gaze::new(&robot, "camera_top")?;
-        let angles = gaze.fixate(&place(&facing, OTHER_ARM[0], OBJECT.1));
+        let angles = gaze.fixate(&place(&facing, OTHER_ARM[0], OBJECT.1)?);
         // The other robot looks at the self-robot's hand.
-        let other_looks = gaze.fixate_in(&facing, &place(&Isometry3::identity(), SELF_ARM[0], 0.0));
+        let other_looks = gaze.fixate_in(&facing, &place(&Isometry3::identity(), SELF_ARM[0], 0.0)?);
         let own = world.add_robot(
             &robot,
             &Placement {
@@ -238,7 +238,7 @@ impl Interaction {
     /// The same without noise.
     #[must_use]
     pub fn truth(&self) -> [f64; 8] {
-        let angles = self.world.angles(self.own);
+        let angles = self.world.own(self.own).angles();
         let [yaw, pitch] = self.gaze.joints();
         let [x, y] = self.seen;
         [x, y, angles[yaw], angles[pitch], angles[2], angles[3], angles[4], angles[5]]
@@ -253,7 +253,7 @@ impl Interaction {
 
     /// The object's centre in the image.
     fn object_in_image(&self) -> Option<[f64; 2]> {
-        let world_from_camera = self.world.link(self.own, self.camera);
+        let world_from_camera = self.world.own(self.own).of_link(self.camera);
         nao::CAMERA.project(&world_from_camera, &self.object_place()).filter(|place| nao::CAMERA.sees(*place))
     }
 
@@ -269,7 +269,7 @@ impl Interaction {
 
     /// Lets a sample's time pass while the arm moves evenly to `arm`.
     pub fn step(&mut self, arm: [f64; 4]) {
-        let from: Vec<f64> = self.world.goals(self.own)[2..].to_vec();
+        let from: Vec<f64> = self.world.own(self.own).goals()[2..].to_vec();
         self.pass(|share| std::array::from_fn(|joint| from[joint] + share * (arm[joint] - from[joint])));
     }
 
@@ -288,10 +288,10 @@ impl Interaction {
             let seconds = (self.taken as f64 + share) * PERIOD;
             let look = self.gaze.fixate(&self.object_place());
             let head = self.head.follow(look, PERIOD / steps as f64);
-            self.world.set_goals(self.own, &[&head[..], &arm(share)].concat());
-            for (joint, angle) in between(&OTHER_ARM, out(&self.order, seconds)).into_iter().enumerate() {
-                self.world.set_goal(self.other, 2 + joint, angle);
-            }
+            self.world.steer(self.own, &[&head[..], &arm(share)].concat());
+            let mut goals = self.world.own(self.other).goals();
+            goals[2..].copy_from_slice(&between(&OTHER_ARM, out(&self.order, seconds)));
+            self.world.steer(self.other, &goals);
             self.world.step();
             self.find_collisions();
         }
@@ -300,9 +300,9 @@ impl Interaction {
     }
 
     fn find_collisions(&mut self) {
-        for contact in self.world.contacts_of(self.own) {
+        for contact in self.world.contacts_with(self.own) {
             let [a, b] = contact.bodies;
-            let (mine, theirs) = if self.world.is_link_of(a, self.own) { (a, b) } else { (b, a) };
+            let (mine, theirs) = if self.world.belongs_to(a, self.own) { (a, b) } else { (b, a) };
             let kind = match (mine == self.hands[0], theirs) {
                 (true, body) if body == self.hands[1] => Collision::Hand,
                 (true, body) if body == self.object => Collision::Object,
@@ -329,13 +329,13 @@ impl Interaction {
     /// The object's centre in the world.
     #[must_use]
     pub fn object_place(&self) -> Point3<f64> {
-        self.world.pose(self.object).translation.vector.into()
+        self.world.pose_of(self.object).translation.vector.into()
     }
 
     /// The self-robot's hand in the world.
     #[must_use]
     pub fn hand_place(&self) -> Point3<f64> {
-        self.world.link(self.own, self.effector).translation.vector.into()
+        self.world.own(self.own).of_link(self.effector).translation.vector.into()
     }
 
     /// All that can be seen now.
@@ -353,13 +353,13 @@ impl Interaction {
     /// How all joints stand, of the self-robot and of the other one, those too that the experiment locks.
     #[must_use]
     pub fn joint_states(&self) -> [Vec<JointState<'_>>; 2] {
-        [self.own, self.other].map(|robot| self.world.joint_states(robot))
+        [self.own, self.other].map(|robot| self.world.own(robot).joint_states())
     }
 
     /// Angles, and goals, of the self-robot's head and right arm.
     #[must_use]
     pub fn joints(&self) -> [Vec<f64>; 2] {
-        [self.world.angles(self.own), self.world.goals(self.own)]
+        [self.world.own(self.own).angles(), self.world.own(self.own).goals()]
     }
 }
 
@@ -372,18 +372,18 @@ impl Interaction {
 }
 
 /// Records the first `count` samples of an order with a tutored arm. `watch` sees the world at each of them. The sensors'
-/// noise is not that of an [`Interaction`] with the same seed.
+/// noise comes from a seed and the recording's number; it is not that of an [`Interaction`] with the same two.
 ///
 /// # Errors
 /// [`Error::Setting`] for senseless options.
 pub fn record(
     order: &[Side],
     options: &InteractionOptions,
-    seed: u64,
+    (seed, index): (u64, u64),
     count: usize,
     mut watch: impl FnMut(&Interaction, &[f64; 8]),
 ) -> Result<Sequence> {
-    let mut interaction = Interaction::with_noise(order, options, stream(seed, Purpose::RecordedNoise, 0))?;
+    let mut interaction = Interaction::with_noise(order, options, stream(seed, Purpose::RecordingSensors, index))?;
     let count = count.min(samples(order));
     let mut values = Vec::with_capacity(count * CHANNELS.len());
     for _ in 0..count {

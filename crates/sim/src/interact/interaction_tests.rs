@@ -8,7 +8,7 @@ fn quiet() -> InteractionOptions {
 }
 
 fn one(order: &str) -> Sequence {
-    record(&parse_order(order).unwrap(), &quiet(), 1, usize::MAX, |_, _| {}).unwrap()
+    record(&parse_order(order).unwrap(), &quiet(), (1, 0), usize::MAX, |_, _| {}).unwrap()
 }
 
 #[test]
@@ -57,7 +57,7 @@ fn the_head_lags_behind_so_that_the_image_shows_the_movement() {
 #[test]
 fn nothing_touches_while_the_robots_agree_and_hands_collide_when_they_do_not() {
     let touched = |order: &str, arm: Option<Side>| {
-        let mut interaction = Interaction::new(&parse_order(order).unwrap(), &quiet(), 1).unwrap();
+        let mut interaction = Interaction::new(&parse_order(order).unwrap(), &quiet(), 1, 0).unwrap();
         let mut found = Vec::new();
         for _ in 0..70 {
             match arm {
@@ -81,10 +81,10 @@ fn nothing_touches_while_the_robots_agree_and_hands_collide_when_they_do_not() {
 fn noise_has_the_deviation_that_was_asked_for_and_the_same_seed_the_same_bits() {
     let order = parse_order("L").unwrap();
     let options = InteractionOptions::default();
-    let noisy = record(&order, &options, 3, usize::MAX, |_, _| {}).unwrap();
-    assert_eq!(noisy, record(&order, &options, 3, usize::MAX, |_, _| {}).unwrap());
-    assert_ne!(noisy, record(&order, &options, 4, usize::MAX, |_, _| {}).unwrap());
-    let clean = record(&order, &quiet(), 3, usize::MAX, |_, _| {}).unwrap();
+    let noisy = record(&order, &options, (3, 0), usize::MAX, |_, _| {}).unwrap();
+    assert_eq!(noisy, record(&order, &options, (3, 0), usize::MAX, |_, _| {}).unwrap());
+    assert_ne!(noisy, record(&order, &options, (4, 0), usize::MAX, |_, _| {}).unwrap());
+    let clean = record(&order, &quiet(), (3, 0), usize::MAX, |_, _| {}).unwrap();
     for channel in 0..8 {
         let squares: f64 = noisy
             .values()
@@ -105,11 +105,11 @@ fn a_trial_draws_other_noise_than_the_recording_of_its_seed() {
         (0..8).map(|channel| (noisy[channel] - truth[channel]) / options.noise.0[channel]).collect()
     };
     let mut recorded = Vec::new();
-    record(&order, &options, seed, usize::MAX, |interaction, sample| {
+    record(&order, &options, (seed, 0), usize::MAX, |interaction, sample| {
         recorded.extend(standardised(sample, &interaction.truth()));
     })
     .unwrap();
-    let mut trial = Interaction::new(&order, &options, seed).unwrap();
+    let mut trial = Interaction::new(&order, &options, seed, 0).unwrap();
     let mut sensed = Vec::new();
     for _ in 0..trial.samples() {
         let sample = trial.sense();
@@ -128,7 +128,7 @@ fn a_noise_that_is_no_number_is_refused() {
     for bad in [-0.1, f64::NAN, f64::INFINITY] {
         let mut options = quiet();
         options.noise.0[3] = bad;
-        let message = Interaction::new(&[Side::Left], &options, 1).err().unwrap().to_string();
+        let message = Interaction::new(&[Side::Left], &options, 1, 0).err().unwrap().to_string();
         assert!(message.contains("a sensor's noise") && message.contains(&bad.to_string()), "{message}");
     }
 }

@@ -2,9 +2,9 @@
 
 use rand::RngExt;
 use scrnn::analysis::excursions::Side;
+use scrnn::streams::{Purpose, stream};
 
 use crate::error::{Error, Result};
-use crate::streams::{Purpose, stream};
 
 /// Seconds between samples.
 pub const PERIOD: f64 = 0.1;
@@ -41,10 +41,11 @@ pub fn all_orders(branches: usize) -> Vec<Vec<Side>> {
     (0..1_usize << branches).map(|number| (0..branches).map(|branch| side(number, branch)).collect()).collect()
 }
 
-/// An order drawn at random; each side is left with probability `left`.
+/// An order drawn at random; each side is left with probability `left`. `purpose` and `index` say which of a seed's streams
+/// it comes from: [`Purpose::RecordingOrders`] or [`Purpose::TrialOrders`].
 #[must_use]
-pub fn random_order(branches: usize, left: f64, seed: u64) -> Vec<Side> {
-    let mut random = stream(seed, Purpose::Orders, 0);
+pub fn random_order(branches: usize, left: f64, seed: u64, purpose: Purpose, index: u64) -> Vec<Side> {
+    let mut random = stream(seed, purpose, index);
     let side = |_| if random.random::<f64>() < left { Side::Left } else { Side::Right };
     (0..branches).map(side).collect()
 }

@@ -15,13 +15,17 @@ use scrnn::engine::Engine;
 use scrnn::generation::{ChannelFeedback, Feedback, Running};
 use scrnn::network::Network;
 use scrnn::scaling::Scaling;
+use scrnn::streams::{Purpose, stream};
 
 use crate::error::{Error, Result};
 use crate::reach::channels::{ARM, REACHING, VISION};
 use crate::reach::stage::{Stage, retracted_arm, samples_to_steps};
 use crate::reach::touching::{Cycle, TouchDetector};
-use crate::streams::{Purpose, stream};
 use crate::world::WorldOptions;
+
+/// Which stream of [`Purpose::StandIn`] is whose.
+const CONSTANT_NOISE: u64 = 0;
+const MIXTURE_NOISE: u64 = 1;
 
 /// What is expected of the next sample, and where the arm is to go, by channel in rad.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -101,7 +105,7 @@ impl NetworkDriver {
                 return Err(Error::Length { what: "the constant variance", found: variance.len(), needed: channels });
             }
             Noise::Constant(variance) => {
-                Some((variance.iter().map(|v| v.sqrt()).collect(), stream(seed, Purpose::ConstantNoise, 0)))
+                Some((variance.iter().map(|v| v.sqrt()).collect(), stream(seed, Purpose::StandIn, CONSTANT_NOISE)))
             }
             _ => None,
         };
@@ -188,7 +192,7 @@ impl MixtureDriver {
     /// regression's covariance is added.
     #[must_use]
     pub fn new(regression: MixtureRegression, cycle: usize, noise: Option<u64>) -> Self {
-        Self { regression, cycle, at: 0, random: noise.map(|seed| stream(seed, Purpose::MixtureNoise, 0)) }
+        Self { regression, cycle, at: 0, random: noise.map(|seed| stream(seed, Purpose::StandIn, MIXTURE_NOISE)) }
     }
 
     /// What is given for sample `at`: the phase within the metronome's beat, from 0 to 1, then the head's angles.
@@ -285,11 +289,11 @@ pub fn perform<E: From<Error>>(
         }
         let sensed = stage.angles();
         let decision = driver.decide(&sensed)?;
-        let goals = stage.world.goals(stage.robot());
+        let goals = stage.world.own(stage.robot()).goals();
         observer(&Snapshot { stage: &stage, goals, decision: Some((&sensed, &decision)), contact: None })?;
         let mut target = decision.target;
         for (joint, angle) in target.iter_mut().enumerate() {
-            let limits = robot.limits(VISION + joint);
+            let limits = robot.limits(VISION + joint)?;
             if !(limits.lower..=limits.upper).contains(angle) {
                 performed.beyond_limits += 1;
                 *angle = angle.clamp(limits.lower, limits.upper);
@@ -301,8 +305,8 @@ pub fn perform<E: From<Error>>(
             let way: [f64; 4] = std::array::from_fn(|joint| arm[joint] + share * (target[joint] - arm[joint]));
             stage.step(&way);
             let contact = detector.observe(stage.hand_state());
-            collided |= step % 5 == 0 && stage.world.self_collision(stage.robot()).is_some();
-            let goals = stage.world.goals(stage.robot());
+            collided |= step % 5 == 0 && stage.world.self_collision(stage.robot())?.is_some();
+            let goals = stage.world.own(stage.robot()).goals();
             observer(&Snapshot { stage: &stage, goals, decision: None, contact })?;
         }
         performed.self_collisions += usize::from(collided);

@@ -67,13 +67,13 @@ fn vision_is_sensed_and_the_arm_runs_on_its_own_prediction() {
     let topology = Topology::s_ctrnn(6, 8, 2.0).unwrap();
     let (network, states) = initialize(&topology, 1, 3);
     let mut driver = driver(&Noise::Predicted);
-    let mut plain = scrnn::forward::Plain::new(&network, states.mean());
+    let mut plain = scrnn::forward::Plain::new(&network, states.mean()).unwrap();
     let mut arm = None;
     for k in 0..5 {
         let sensed: Vec<f64> = (0..6).map(|channel| 0.1 * f64::from(channel + k)).collect();
         let decision = driver.decide(&sensed).unwrap();
         let input = [&sensed[..2], arm.as_ref().map_or(&sensed[2..], |arm: &[f64; 4]| &arm[..])].concat();
-        plain.step(&input);
+        plain.step(&input).unwrap();
         assert!(decision.mean.iter().zip(&plain.y).all(|(a, b)| (a - b).abs() < 1e-12), "step {k}");
         assert!(decision.target.iter().zip(&decision.mean[2..]).all(|(target, mean)| target != mean));
         arm = Some(decision.target);

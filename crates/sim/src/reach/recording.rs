@@ -44,7 +44,7 @@ impl DemonstrationSample {
     /// At the stage as it is.
     #[must_use]
     pub fn at(stage: &Stage, sensed: &[f64]) -> Self {
-        let states = stage.world.joint_states(stage.robot());
+        let states = stage.world.own(stage.robot()).joint_states();
         let joints = states.into_iter().map(|state| (state.name.to_owned(), state.angle)).collect();
         Self { time: stage.world.time(), sensed: sensed.to_vec(), joints, scene: stage.world.scene() }
     }
@@ -113,13 +113,13 @@ impl<W: Write + Seek> ReachingRecording<W> {
             return Ok(());
         }
         self.pictures += 1;
-        let states = stage.world.joint_states(stage.robot());
+        let states = stage.world.own(stage.robot()).joint_states();
         self.recorder.joint_states(time, &states.into_iter().map(Joint::from).collect::<Vec<_>>())?;
         self.recorder.joint_targets(time, &targets(&snapshot.goals))?;
         let contacts = stage.world.contacts();
         let contacts = contacts.iter().map(|contact| Contact {
-            a: stage.world.name(contact.bodies[0]),
-            b: stage.world.name(contact.bodies[1]),
+            a: stage.world.name_of(contact.bodies[0]),
+            b: stage.world.name_of(contact.bodies[1]),
             distance: Some(-contact.depth),
             force: Some(contact.force),
         });

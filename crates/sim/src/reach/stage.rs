@@ -5,6 +5,7 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use rand::RngExt;
+use scrnn::streams::{Purpose, stream};
 
 use crate::error::{Error, Result};
 use crate::reach::touching::HandState;
@@ -13,7 +14,6 @@ use crate::robot::gaze::Gaze;
 use crate::robot::joints::RIGHT_ARM;
 use crate::robot::kinematics::InverseKinematics;
 use crate::robot::nao;
-use crate::streams::{Purpose, stream};
 use crate::world::scene::{Part, Shape};
 use crate::world::{BodyId, Placement, RobotId, World, WorldOptions};
 
@@ -69,7 +69,7 @@ pub fn samples_to_steps(options: &WorldOptions) -> Result<usize> {
 #[derive(Debug)]
 pub struct Stage {
     /// The robot, the bench and the sphere in it.
-    pub world: World,
+    pub(crate) world: World,
     robot: RobotId,
     gaze: Gaze,
     sphere: BodyId,
@@ -103,7 +103,7 @@ impl Stage {
         let bench = world.add_fixed("bench", Part::Furniture, bench, bench_at)?;
         let sphere = Shape::Sphere { radius: RADIUS };
         let sphere = world.add_fixed("sphere", Part::Object, sphere, Isometry3::from(place.coords))?;
-        world.ignore_contacts(bench, sphere);
+        world.ignore_contacts(bench, sphere)?;
         let hand = world.body("self/r_hand")?;
         Ok(Self { world, robot, gaze, sphere, hand, effector, y, frozen })
     }
@@ -115,9 +115,14 @@ impl Stage {
     pub fn move_sphere(&mut self, y: f64) -> Result<()> {
         check(y)?;
         self.y = y;
-        let place = self.world.world_from_root(self.robot) * sphere_at(y);
-        self.world.place(self.sphere, &Isometry3::from(place.coords));
-        Ok(())
+        let place = self.world.own(self.robot).world_from_root() * sphere_at(y);
+        self.world.place(self.sphere, &Isometry3::from(place.coords))
+    }
+
+    /// Its world.
+    #[must_use]
+    pub fn world(&self) -> &World {
+        &self.world
     }
 
     /// The robot.
@@ -129,23 +134,24 @@ impl Stage {
     /// One step of the world, in which the arm goes for `arm`, and the head for the sphere.
     pub fn step(&mut self, arm: &[f64; 4]) {
         let head = self.frozen.unwrap_or_else(|| self.gaze.fixate(&sphere_at(self.y)));
-        self.world.set_goals(self.robot, &[head[0], head[1], arm[0], arm[1], arm[2], arm[3]]);
+        self.world.steer(self.robot, &[head[0], head[1], arm[0], arm[1], arm[2], arm[3]]);
         self.world.step();
     }
 
     /// True angles of head and arm, by channel.
     #[must_use]
     pub fn angles(&self) -> Vec<f64> {
-        self.world.angles(self.robot)
+        self.world.own(self.robot).angles()
     }
 
     /// Where the hand is, and how far from the sphere.
     #[must_use]
     pub fn hand_state(&self) -> HandState {
-        let tip = Point3::from(self.world.link(self.robot, self.effector).translation.vector);
-        let hand = self.world.world_from_root(self.robot).inverse_transform_point(&tip);
+        let robot = self.world.own(self.robot);
+        let tip = Point3::from(robot.of_link(self.effector).translation.vector);
+        let hand = robot.world_from_root().inverse_transform_point(&tip);
         let expected = touching_hand(self.y);
-        let gap = self.world.gap(self.hand, self.sphere);
+        let gap = self.world.distance(self.hand, self.sphere);
         HandState { time: self.world.time(), gap, aim: (hand - expected).norm(), hand: hand.coords.into() }
     }
 }
@@ -220,7 +226,7 @@ pub fn gaze_at(robot: &Robot, y: f64) -> Result<[f64; 2]> {
 /// Places drawn evenly between positions 1 and 3.
 #[must_use]
 pub fn places_between(seed: u64, count: usize) -> Vec<f64> {
-    let mut random = stream(seed, Purpose::Places, 0);
+    let mut random = stream(seed, Purpose::TrialPlaces, 0);
     (0..count).map(|_| random.random_range(POSITIONS[0]..POSITIONS[2])).collect()
 }
 

@@ -10,6 +10,7 @@ use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::jobs::side_by_side;
+use scrnn::streams::{Purpose, stream};
 
 use crate::error::{Error, Result};
 use crate::reach::channels::REACHING;
@@ -18,7 +19,6 @@ use crate::reach::touching::{Cycle, TouchDetector};
 use crate::robot::Robot;
 use crate::robot::joints::RIGHT_ARM;
 use crate::robot::nao;
-use crate::streams::{Purpose, stream};
 use crate::world::{Servo, WorldOptions};
 
 /// What the tutor does, and how well.
@@ -133,14 +133,14 @@ fn demonstration<T>(
     sequence: usize,
     look: &dyn Fn(&Stage, &[f64]) -> T,
 ) -> Result<(Demonstration, Vec<T>)> {
-    let mut random = stream(seed, Purpose::Tutor, sequence as u64);
+    let mut random = stream(seed, Purpose::Demonstrations, sequence as u64);
     let position = sequence % POSITIONS.len();
     let y = POSITIONS[position] + random.random_range(-1.0..1.0) * tutoring.placement;
     let path = Path::draw(robot, y, tutoring.samples, &mut random)?;
 
     let mut stage = Stage::new(tutoring.world, y, &path.at(0.0), None)?;
     for joint in 2..robot.dof() {
-        stage.world.set_servo(stage.robot(), joint, Servo { stiffness: 60.0, damping: 2.5 });
+        stage.world.set_servo(stage.robot(), joint, Servo { stiffness: 60.0, damping: 2.5 })?;
     }
     let steps = samples_to_steps(&tutoring.world)?;
     let mut detector = TouchDetector::default();
@@ -202,10 +202,11 @@ impl Path {
             wander.push(before.map(|w| MEMORY * w + innovation * normal(random)));
         }
         let arm = robot.joints_named(&RIGHT_ARM)?;
-        let limits = std::array::from_fn(|joint| {
-            let limits = robot.limits(arm[joint]);
-            [limits.lower, limits.upper]
-        });
+        let mut limits = [[0.0; 2]; 4];
+        for (limits, &joint) in limits.iter_mut().zip(&arm) {
+            let of_joint = robot.limits(joint)?;
+            *limits = [of_joint.lower, of_joint.upper];
+        }
         Ok(Self { keys, touches, wander, limits })
     }
 

@@ -54,7 +54,7 @@ impl Last {
             assert!(self.frames.contains_key(&name), "no frame `{name}`");
             (self.world_from(&name).translation.vector - (root * place).translation.vector).norm()
         };
-        robot.links.iter().zip(robot.forward(&q)).map(off).fold(0.0, f64::max)
+        robot.links.iter().zip(robot.forward(&q).unwrap()).map(off).fold(0.0, f64::max)
     }
 }
 

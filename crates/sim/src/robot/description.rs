@@ -161,14 +161,11 @@ impl Robot {
 
     /// The limits of the angle at place `index` of q.
     ///
-    /// # Panics
-    /// If there is no such angle.
-    #[must_use]
-    pub fn limits(&self, index: usize) -> Limits {
-        match self.joints[self.movable[index]].motion {
-            Motion::Revolute { limits, .. } => limits,
-            Motion::Fixed => Limits { lower: 0.0, upper: 0.0, velocity: 0.0, effort: 0.0 },
-        }
+    /// # Errors
+    /// [`Error::NoSuch`] if there is no such angle.
+    pub fn limits(&self, index: usize) -> Result<Limits> {
+        let limits = self.movable().nth(index).map(|(_, limits)| limits);
+        limits.ok_or(Error::NoSuch { what: "movable joint", index, count: self.dof() })
     }
 
     /// The index of a link.
@@ -195,7 +192,7 @@ impl Robot {
     /// [`Error::Missing`] for a joint that is not there, [`Error::Joint`] for an angle beyond its limits.
     pub fn lock(&mut self, name: &str, angle: f64) -> Result<()> {
         let index = self.joint(name)?;
-        let Limits { lower, upper, .. } = self.limits(index);
+        let Limits { lower, upper, .. } = self.limits(index)?;
         if !(lower..=upper).contains(&angle) {
             return Err(bad_joint(name, &format!("cannot be locked at {angle} rad; needed: {lower} to {upper}")));
         }
@@ -225,8 +222,7 @@ impl Robot {
     }
 
     /// Whether contacts of two links are left out.
-    #[must_use]
-    pub fn may_overlap(&self, a: usize, b: usize) -> bool {
+    pub(crate) fn may_overlap(&self, a: usize, b: usize) -> bool {
         self.ignored.iter().any(|&(c, d)| (a, b) == (c, d) || (a, b) == (d, c))
             || self.next_above(a) == Some(b)
             || self.next_above(b) == Some(a)
@@ -246,8 +242,7 @@ impl Robot {
     }
 
     /// The link that `link` is fixed to: the uppermost that fixed joints lead to.
-    #[must_use]
-    pub fn group(&self, link: usize) -> usize {
+    pub(crate) fn group(&self, link: usize) -> usize {
         let mut at = link;
         while let Some(joint) = self.links[at].joint {
             let joint = &self.joints[joint];

@@ -33,7 +33,7 @@ impl Gaze {
     pub fn new(robot: &Robot, camera: &str) -> Result<Self> {
         let joints = [robot.joint(HEAD[0])?, robot.joint(HEAD[1])?];
         let camera_link = robot.link(camera)?;
-        let rest = robot.forward(&vec![0.0; robot.dof()]);
+        let rest = robot.forward(&vec![0.0; robot.dof()])?;
         let neck = robot
             .joints
             .iter()
@@ -48,7 +48,7 @@ impl Gaze {
         }
         let tilt = (-axis.z).atan2(axis.x);
         let above = at.x * tilt.sin() + at.z * tilt.cos();
-        let limits = robot.limits(joints[0]);
+        let limits = robot.limits(joints[0])?;
         Ok(Self { neck, tilt, above, yaw: [limits.lower, limits.upper], joints })
     }
 
@@ -117,7 +117,7 @@ mod tests {
                 let [low, high] = pitch_limits(yaw);
                 let mut q = vec![0.0; robot.dof()];
                 [q[gaze.joints()[0]], q[gaze.joints()[1]]] = [yaw, pitch];
-                let seen = nao::CAMERA.project(&robot.forward(&q)[robot.link(camera).unwrap()], &target).unwrap();
+                let seen = nao::CAMERA.project(&robot.forward(&q).unwrap()[robot.link(camera).unwrap()], &target).unwrap();
                 if pitch > low && pitch < high {
                     prop_assert!((seen[0] - 160.0).abs() < 1e-6 && (seen[1] - 120.0).abs() < 1e-6, "{camera} {seen:?}");
                 } else {

@@ -10,11 +10,12 @@ use crate::robot::{Motion, Robot};
 impl Robot {
     /// Leads from each link's frame to the root's, at the angles q.
     ///
-    /// # Panics
-    /// If q does not hold one angle for each movable joint.
-    #[must_use]
-    pub fn forward(&self, q: &[f64]) -> Vec<Isometry3<f64>> {
-        assert_eq!(q.len(), self.dof(), "one angle for each movable joint");
+    /// # Errors
+    /// [`Error::Length`] if q does not hold one angle for each movable joint.
+    pub fn forward(&self, q: &[f64]) -> Result<Vec<Isometry3<f64>>> {
+        if q.len() != self.dof() {
+            return Err(Error::Length { what: "the posture", found: q.len(), needed: self.dof() });
+        }
         let mut root_from_link = vec![Isometry3::identity(); self.links.len()];
         for joint in &self.joints {
             let turn = match joint.motion {
@@ -23,7 +24,7 @@ impl Robot {
             };
             root_from_link[joint.child] = root_from_link[joint.parent] * joint.parent_from_joint * turn;
         }
-        root_from_link
+        Ok(root_from_link)
     }
 
     /// How a link's origin moves with each angle, in m/rad: one column for each angle of q.
@@ -74,7 +75,8 @@ impl InverseKinematics {
     /// Of all such postures it finds one near `start`.
     ///
     /// # Errors
-    /// [`Error::OutOfReach`] with the distance that is left.
+    /// [`Error::OutOfReach`] with the distance that is left; [`Error::Length`] for a start of another size, and
+    /// [`Error::NoSuch`] for a link or a joint that is not there.
     pub fn solve(
         &self,
         robot: &Robot,
@@ -83,11 +85,16 @@ impl InverseKinematics {
         start: &[f64],
         target: &Point3<f64>,
     ) -> Result<Vec<f64>> {
+        let no_such = |what, index, count| Error::NoSuch { what, index, count };
+        let tip = robot.links.get(link).ok_or_else(|| no_such("link", link, robot.links.len()))?;
+        if let Some(&joint) = joints.iter().find(|&&joint| joint >= robot.dof()) {
+            return Err(no_such("movable joint", joint, robot.dof()));
+        }
         let mut q = start.to_vec();
         robot.clamp(&mut q);
         let mut best = (f64::INFINITY, q.clone());
         for _ in 0..self.iterations {
-            let root_from_link = robot.forward(&q);
+            let root_from_link = robot.forward(&q)?;
             let error = target.coords - root_from_link[link].translation.vector;
             if error.norm() < best.0 {
                 best = (error.norm(), q.clone());
@@ -102,7 +109,7 @@ impl InverseKinematics {
             robot.clamp(&mut q);
         }
         let [x, y, z] = target.coords.into();
-        Err(Error::OutOfReach { link: robot.links[link].name.clone(), distance: best.0, x, y, z })
+        Err(Error::OutOfReach { link: tip.name.clone(), distance: best.0, x, y, z })
     }
 
     /// One step of all angles; those that are not free stay.
@@ -116,6 +123,7 @@ impl InverseKinematics {
     ) -> DVector<f64> {
         let mut free = vec![false; q.len()];
         joints.iter().for_each(|&joint| free[joint] = true);
+        let limits: Vec<_> = robot.movable().map(|(_, limits)| limits).collect();
         let lambda = self.damping.powi(2) * (error.norm() / self.reach).min(1.0);
         loop {
             let mut used = jacobian.clone();
@@ -128,10 +136,9 @@ impl InverseKinematics {
             let step =
                 damped.lu().solve(error).map_or_else(|| DVector::zeros(q.len()), |solved| used.transpose() * solved);
             let blocked = (0..q.len()).filter(|&index| {
-                let limits = robot.limits(index);
                 free[index]
-                    && ((q[index] >= limits.upper && step[index] > 0.0)
-                        || (q[index] <= limits.lower && step[index] < 0.0))
+                    && ((q[index] >= limits[index].upper && step[index] > 0.0)
+                        || (q[index] <= limits[index].lower && step[index] < 0.0))
             });
             let blocked: Vec<usize> = blocked.collect();
             if blocked.is_empty() {
@@ -171,7 +178,7 @@ mod tests {
         fn forward_kinematics_agree_with_a_closed_form(shares in proptest::collection::vec(0.0..1.0, 10)) {
             let robot = nao::robot();
             let q = posture(&robot, &shares);
-            let places = robot.forward(&q);
+            let places = robot.forward(&q).unwrap();
             let arm: Vec<f64> = robot.joints_named(&RIGHT_ARM).unwrap().into_iter().map(|joint| q[joint]).collect();
             let right = places[robot.link("r_effector").unwrap()].translation.vector;
             let expected = right_effector(arm.try_into().unwrap());
@@ -192,18 +199,35 @@ mod tests {
         fn inverse_kinematics_find_what_can_be_reached(shares in proptest::collection::vec(0.1..0.9, 10)) {
             let robot = nao::robot();
             let (link, joints) = (robot.link("r_effector").unwrap(), robot.joints_named(&RIGHT_ARM).unwrap());
-            let target: Point3<f64> = robot.forward(&posture(&robot, &shares))[link].translation.vector.into();
+            let target: Point3<f64> = robot.forward(&posture(&robot, &shares)).unwrap()[link].translation.vector.into();
             // From a posture nearby.
             let near: Vec<f64> = shares.iter().map(|share| share + 0.06 * (40.0 * share).sin()).collect();
             let start = posture(&robot, &near);
             let q = InverseKinematics::default().solve(&robot, link, &joints, &start, &target).unwrap();
-            prop_assert!((robot.forward(&q)[link].translation.vector - target.coords).norm() <= 1e-7);
+            prop_assert!((robot.forward(&q).unwrap()[link].translation.vector - target.coords).norm() <= 1e-7);
             for (index, q) in q.iter().enumerate() {
-                let limits = robot.limits(index);
+                let limits = robot.limits(index).unwrap();
                 prop_assert!((limits.lower..=limits.upper).contains(q));
                 prop_assert!(joints.contains(&index) || *q == start[index]);
             }
         }
+    }
+
+    #[test]
+    fn what_the_robot_does_not_have_is_refused() {
+        let robot = nao::robot();
+        let solve = |link, joints: &[usize], start: &[f64]| {
+            let found = InverseKinematics::default().solve(&robot, link, joints, start, &Point3::origin());
+            found.unwrap_err().to_string()
+        };
+        assert_eq!(
+            solve(99, &[0], &[0.0; 10]),
+            format!("there is no link 99; there are {}, counted from 0", robot.links.len())
+        );
+        assert_eq!(solve(0, &[10], &[0.0; 10]), "there is no movable joint 10; there are 10, counted from 0");
+        assert_eq!(solve(0, &[0], &[0.0; 9]), "the posture holds 9 values; needed: 10");
+        assert_eq!(robot.forward(&[0.0; 11]).unwrap_err().to_string(), "the posture holds 11 values; needed: 10");
+        assert_eq!(robot.limits(10).unwrap_err().to_string(), solve(0, &[10], &[0.0; 10]));
     }
 
     #[test]

@@ -61,9 +61,9 @@ mod tests {
         // Torso, neck and head, and two arms of five parts.
         let arm = 0.075_04 + 0.157_77 + 0.064_83 + 0.077_61 + 0.185_33;
         assert!((mass - (1.049_56 + 0.064_42 + 0.605_33 + 2.0 * arm)).abs() < 1e-12, "{mass}");
-        let bend = robot.limits(robot.joint("RElbowRoll").unwrap());
+        let bend = robot.limits(robot.joint("RElbowRoll").unwrap()).unwrap();
         assert_eq!([bend.lower, bend.upper, bend.velocity, bend.effort], [0.034_906_6, 1.544_62, 7.194_07, 1.532]);
-        let mirrored = robot.limits(robot.joint("LElbowRoll").unwrap());
+        let mirrored = robot.limits(robot.joint("LElbowRoll").unwrap()).unwrap();
         assert_eq!([mirrored.lower, mirrored.upper], [-1.544_62, -0.034_906_6]);
     }
 
@@ -104,7 +104,7 @@ mod tests {
         let all = load().unwrap();
         let q = [0.3, -0.2, 0.2, -0.6, 0.1, 1.2];
         let with_left = [&q[..], &LEFT_ARM_AT_REST].concat();
-        for (one, all) in robot.forward(&q).iter().zip(all.forward(&with_left)) {
+        for (one, all) in robot.forward(&q).unwrap().iter().zip(all.forward(&with_left).unwrap()) {
             assert!((one.translation.vector - all.translation.vector).norm() < 1e-12);
             assert!(one.rotation.angle_to(&all.rotation) < 1e-7);
         }

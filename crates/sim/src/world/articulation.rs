@@ -61,7 +61,7 @@ impl Articulation {
         q: &[f64],
     ) -> Result<Self> {
         check_tree(robot)?;
-        let rest = robot.forward(&vec![0.0; robot.dof()]);
+        let rest = robot.forward(&vec![0.0; robot.dof()])?;
         let place = |link: usize| (robot.group(link), rest[robot.group(link)].inv_mul(&rest[link]));
         let mut bodies = vec![None; robot.links.len()];
         let mut links = Vec::with_capacity(robot.links.len());
@@ -136,6 +136,13 @@ impl Articulation {
                 let Servo { stiffness, damping } = motor.servo;
                 link.joint.data.set_motor(JointAxis::AngX, motor.target, speed, stiffness, damping);
             }
+        }
+    }
+
+    /// Sets where a joint is to go, within its limits.
+    pub fn go(&mut self, joint: usize, angle: f64) {
+        if let Some(motor) = self.motors.get_mut(joint) {
+            motor.goal = angle.clamp(motor.limits.lower, motor.limits.upper);
         }
     }
 

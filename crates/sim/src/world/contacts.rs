@@ -6,7 +6,8 @@ use rapier3d_f64::parry::query;
 use rapier3d_f64::prelude::{ColliderHandle, PairFilterContext, PhysicsHooks, SolverFlags};
 
 use super::articulation::{from_pose, to_pose};
-use super::{BodyId, RobotId, World};
+use super::{BodyId, RobotId, World, mark};
+use crate::error::Result;
 
 /// Two bodies that touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,8 +44,15 @@ impl PhysicsHooks for Ignored {
 
 impl World {
     /// Distance of two bodies' surfaces, in metres; negative by as much as they overlap.
-    #[must_use]
-    pub fn gap(&self, a: BodyId, b: BodyId) -> f64 {
+    ///
+    /// # Errors
+    /// [`Error::Elsewhere`](crate::error::Error::Elsewhere).
+    pub fn gap(&self, a: BodyId, b: BodyId) -> Result<f64> {
+        self.check(a).and_then(|()| self.check(b))?;
+        Ok(self.distance(a, b))
+    }
+
+    pub(crate) fn distance(&self, a: BodyId, b: BodyId) -> f64 {
         let (a, b) = (&self.bodies[a.0], &self.bodies[b.0]);
         let place = |record: &super::BodyRecord, collider: &super::Collider| {
             to_pose(&(from_pose(self.physics.bodies[record.carrier].position()) * collider.carrier_from_physical))
@@ -71,28 +79,51 @@ impl World {
     }
 
     /// Those of them in which a link of the robot touches anything that is none.
-    #[must_use]
-    pub fn contacts_of(&self, robot: RobotId) -> Vec<Contact> {
-        self.contacts_where(|a, b| self.is_link_of(a, robot) != self.is_link_of(b, robot))
+    ///
+    /// # Errors
+    /// [`Error::Elsewhere`](crate::error::Error::Elsewhere).
+    pub fn contacts_of(&self, robot: RobotId) -> Result<Vec<Contact>> {
+        self.robot(robot)?;
+        Ok(self.contacts_with(robot))
+    }
+
+    pub(crate) fn contacts_with(&self, robot: RobotId) -> Vec<Contact> {
+        self.contacts_where(|a, b| self.belongs_to(a, robot) != self.belongs_to(b, robot))
     }
 
     /// Two links of a robot that touch though they should not, if there are any.
-    #[must_use]
-    pub fn self_collision(&self, robot: RobotId) -> Option<Contact> {
-        self.contacts_where(|a, b| self.is_link_of(a, robot) && self.is_link_of(b, robot)).into_iter().next()
+    ///
+    /// # Errors
+    /// [`Error::Elsewhere`](crate::error::Error::Elsewhere).
+    pub fn self_collision(&self, robot: RobotId) -> Result<Option<Contact>> {
+        self.robot(robot)?;
+        let both = self.contacts_where(|a, b| self.belongs_to(a, robot) && self.belongs_to(b, robot));
+        Ok(both.into_iter().next())
     }
 
     /// Whether a body is a link of a robot; what is attached to one is not.
-    #[must_use]
-    pub fn is_link_of(&self, body: BodyId, robot: RobotId) -> bool {
+    ///
+    /// # Errors
+    /// [`Error::Elsewhere`](crate::error::Error::Elsewhere).
+    pub fn is_link_of(&self, body: BodyId, robot: RobotId) -> Result<bool> {
+        self.check(body)?;
+        self.robot(robot)?;
+        Ok(self.belongs_to(body, robot))
+    }
+
+    pub(crate) fn belongs_to(&self, body: BodyId, robot: RobotId) -> bool {
         self.bodies[body.0].robot == Some(robot)
+    }
+
+    fn id_at(&self, index: usize) -> BodyId {
+        BodyId(index, mark(&self.bodies[index].name))
     }
 
     /// The touching pairs that are wanted; only for them the distance is computed.
     fn contacts_where(&self, wanted: impl Fn(BodyId, BodyId) -> bool) -> Vec<Contact> {
         let mut found: BTreeMap<[BodyId; 2], f64> = BTreeMap::new();
         for pair in self.physics.contact_pairs() {
-            let body = |collider: ColliderHandle| BodyId(self.physics.colliders[collider].user_data as usize);
+            let body = |collider: ColliderHandle| self.id_at(self.physics.colliders[collider].user_data as usize);
             let (a, b) = (body(pair.collider1), body(pair.collider2));
             if self.ignored.contains(a.0, b.0) || !wanted(a, b) {
                 continue;
@@ -100,7 +131,7 @@ impl World {
             *found.entry([a.min(b), a.max(b)]).or_default() += pair.total_impulse_magnitude() / self.options.step;
         }
         let touching = found.into_iter().filter_map(|(bodies, force)| {
-            let gap = self.gap(bodies[0], bodies[1]);
+            let gap = self.distance(bodies[0], bodies[1]);
             (gap <= 0.0).then_some(Contact { bodies, depth: -gap, force })
         });
         touching.collect()

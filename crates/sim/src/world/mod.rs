@@ -57,13 +57,19 @@ pub struct Placement<'a> {
     pub hands: &'a [&'a str],
 }
 
-/// A robot of the world it came from.
+/// A robot of the world it came from. Another world takes it only for a robot of the same name and place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct RobotId(usize);
+pub struct RobotId(usize, u64);
 
-/// A body of the world it came from: a link with its shapes, or a thing.
+/// A body of the world it came from: a link with its shapes, or a thing. Another world takes it only for a body of the same name
+/// and place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct BodyId(usize);
+pub struct BodyId(usize, u64);
+
+/// A number for a name, by which another world's is told (FNV-1a).
+fn mark(name: &str) -> u64 {
+    name.bytes().fold(0xcbf2_9ce4_8422_2325, |mark, byte| (mark ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
+}
 
 /// How a joint stands.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -167,7 +173,7 @@ impl World {
         for link in &robot.links {
             self.check_free(&format!("{name}/{}", link.name))?;
         }
-        let id = RobotId(self.robots.len());
+        let id = RobotId(self.robots.len(), mark(name));
         let articulation = Articulation::insert(&mut self.physics, robot, world_from_root, posture)?;
         let mut own = Vec::new();
         for (index, link) in robot.links.iter().enumerate() {
@@ -222,7 +228,7 @@ impl World {
     /// Fixes a thing without mass to a link of a robot.
     ///
     /// # Errors
-    /// [`Error::Taken`], and [`Error::Missing`] for a link that is not there.
+    /// [`Error::Taken`], [`Error::Elsewhere`], and [`Error::Missing`] for a link that is not there.
     pub fn attach(
         &mut self,
         robot: RobotId,
@@ -233,7 +239,7 @@ impl World {
         link_from_shape: Isometry3<f64>,
     ) -> Result<BodyId> {
         self.check_free(name)?;
-        let PlacedRobot { description, articulation, name: of, .. } = &self.robots[robot.0];
+        let PlacedRobot { description, articulation, name: of, .. } = self.robot(robot)?.one;
         let link = description.link(link)?;
         let (carrier, carrier_from_link) = articulation.links[link];
         // It may overlap what holds it, and whatever that may overlap.
@@ -252,40 +258,72 @@ impl World {
     }
 
     /// Lets two bodies pass through each other.
-    pub fn ignore_contacts(&mut self, a: BodyId, b: BodyId) {
+    ///
+    /// # Errors
+    /// [`Error::Elsewhere`]; as all of the following.
+    pub fn ignore_contacts(&mut self, a: BodyId, b: BodyId) -> Result<()> {
+        self.check(a).and_then(|()| self.check(b))?;
         self.ignored.insert(a.0, b.0);
+        Ok(())
     }
 
     /// Moves a thing at once, e.g. when an experimenter puts it elsewhere.
-    pub fn place(&mut self, body: BodyId, world_from_shape: &Isometry3<f64>) {
+    ///
+    /// # Errors
+    /// [`Error::Elsewhere`].
+    pub fn place(&mut self, body: BodyId, world_from_shape: &Isometry3<f64>) -> Result<()> {
+        self.check(body)?;
         let carrier = self.bodies[body.0].carrier;
         if let Some(carrier) = self.physics.bodies.get_mut(carrier).filter(|carrier| !carrier.is_dynamic()) {
             carrier.set_position(to_pose(world_from_shape), true);
         }
+        Ok(())
     }
 
     /// Moves a kinematic thing within the next step.
-    pub fn move_kinematic(&mut self, body: BodyId, world_from_shape: &Isometry3<f64>) {
+    ///
+    /// # Errors
+    /// [`Error::Elsewhere`].
+    pub fn move_kinematic(&mut self, body: BodyId, world_from_shape: &Isometry3<f64>) -> Result<()> {
+        self.check(body)?;
         let carrier = self.bodies[body.0].carrier;
         if let Some(carrier) = self.physics.bodies.get_mut(carrier).filter(|carrier| carrier.is_kinematic()) {
             carrier.set_next_kinematic_position(to_pose(world_from_shape));
         }
+        Ok(())
     }
 
     /// Sets where a joint is to go, within its limits.
-    pub fn set_goal(&mut self, robot: RobotId, joint: usize, angle: f64) {
-        let limits = self.robots[robot.0].description.limits(joint);
-        self.robots[robot.0].articulation.motors[joint].goal = angle.clamp(limits.lower, limits.upper);
+    ///
+    /// # Errors
+    /// [`Error::Elsewhere`], and [`Error::NoSuch`] for a joint that is not there.
+    pub fn set_goal(&mut self, robot: RobotId, joint: usize, angle: f64) -> Result<()> {
+        self.robot(robot)?.description().limits(joint)?;
+        self.robots[robot.0].articulation.go(joint, angle);
+        Ok(())
     }
 
     /// Sets where all joints are to go.
-    pub fn set_goals(&mut self, robot: RobotId, angles: &[f64]) {
-        angles.iter().enumerate().for_each(|(joint, &angle)| self.set_goal(robot, joint, angle));
+    ///
+    /// # Errors
+    /// [`Error::Elsewhere`], and [`Error::Length`] unless there is an angle for each joint.
+    pub fn set_goals(&mut self, robot: RobotId, angles: &[f64]) -> Result<()> {
+        let needed = self.robot(robot)?.description().dof();
+        if angles.len() != needed {
+            return Err(Error::Length { what: "the goals", found: angles.len(), needed });
+        }
+        self.steer(robot, angles);
+        Ok(())
     }
 
     /// Makes a joint's motor stiffer or softer.
-    pub fn set_servo(&mut self, robot: RobotId, joint: usize, servo: Servo) {
+    ///
+    /// # Errors
+    /// [`Error::Elsewhere`], and [`Error::NoSuch`] for a joint that is not there.
+    pub fn set_servo(&mut self, robot: RobotId, joint: usize, servo: Servo) -> Result<()> {
+        self.robot(robot)?.description().limits(joint)?;
         self.robots[robot.0].articulation.set_servo(joint, servo);
+        Ok(())
     }
 
     /// One step.
@@ -309,51 +347,18 @@ impl World {
         self.options
     }
 
-    /// A robot's description.
-    #[must_use]
-    pub fn robot(&self, robot: RobotId) -> &Robot {
-        &self.robots[robot.0].description
-    }
-
-    /// Leads from a robot's root to the world.
-    #[must_use]
-    pub fn world_from_root(&self, robot: RobotId) -> Isometry3<f64> {
-        self.robots[robot.0].world_from_root
-    }
-
-    /// True angles of a robot's joints.
-    #[must_use]
-    pub fn angles(&self, robot: RobotId) -> Vec<f64> {
-        self.robots[robot.0].articulation.state(&self.physics).map(|[angle, _]| angle).collect()
-    }
-
-    /// True velocities of a robot's joints, in rad/s.
-    #[must_use]
-    pub fn velocities(&self, robot: RobotId) -> Vec<f64> {
-        self.robots[robot.0].articulation.state(&self.physics).map(|[_, velocity]| velocity).collect()
-    }
-
-    /// How all joints stand that a robot's description calls movable. Those that are [locked](Robot::lock) hold still.
-    #[must_use]
-    pub fn joint_states(&self, robot: RobotId) -> Vec<JointState<'_>> {
-        let description = &self.robots[robot.0].description;
-        let velocities = self.velocities(robot);
-        let velocity = |name: &str| description.joint(name).map_or(0.0, |index| velocities[index]);
-        let angles = description.all_angles(&self.angles(robot));
-        angles.into_iter().map(|(name, angle)| JointState { name, angle, velocity: velocity(name) }).collect()
-    }
-
-    /// Where a robot's joints are to go.
-    #[must_use]
-    pub fn goals(&self, robot: RobotId) -> Vec<f64> {
-        self.robots[robot.0].articulation.motors.iter().map(|motor| motor.goal).collect()
-    }
-
-    /// Leads from a link to the world; the index is the one in the robot's description.
-    #[must_use]
-    pub fn link(&self, robot: RobotId, link: usize) -> Isometry3<f64> {
-        let (carrier, carrier_from_link) = self.robots[robot.0].articulation.links[link];
-        from_pose(self.physics.bodies[carrier].position()) * carrier_from_link
+    /// A robot as it stands now.
+    ///
+    /// # Errors
+    /// [`Error::Elsewhere`].
+    pub fn robot(&self, robot: RobotId) -> Result<RobotState<'_>> {
+        match self.robots.get(robot.0) {
+            Some(one) if mark(&one.name) == robot.1 => Ok(self.own(robot)),
+            _ => {
+                let present = self.robots.iter().map(|one| one.name.as_str()).collect::<Vec<_>>().join(", ");
+                Err(Error::Elsewhere { what: "robot", present })
+            }
+        }
     }
 
     /// A body by name.
@@ -368,16 +373,21 @@ impl World {
     }
 
     /// A body's name.
-    #[must_use]
-    pub fn name(&self, body: BodyId) -> &str {
-        &self.bodies[body.0].name
+    ///
+    /// # Errors
+    /// [`Error::Elsewhere`].
+    pub fn name(&self, body: BodyId) -> Result<&str> {
+        self.check(body)?;
+        Ok(self.name_of(body))
     }
 
     /// Leads from a thing's shape, or from the first shape of a link, to the world.
-    #[must_use]
-    pub fn pose(&self, body: BodyId) -> Isometry3<f64> {
-        let record = &self.bodies[body.0];
-        from_pose(self.physics.bodies[record.carrier].position()) * record.colliders[0].carrier_from_shape
+    ///
+    /// # Errors
+    /// [`Error::Elsewhere`].
+    pub fn pose(&self, body: BodyId) -> Result<Isometry3<f64>> {
+        self.check(body)?;
+        Ok(self.pose_of(body))
     }
 
     /// All that can be seen now.
@@ -395,13 +405,25 @@ impl World {
                 scene.bodies.push(Body { name, part: record.part, shape: collider.shape.clone(), world_from_shape });
             }
         }
-        for (index, one) in self.robots.iter().enumerate() {
+        for one in &self.robots {
             for (link, description) in one.description.links.iter().enumerate() {
                 let name = format!("{}/{}", one.name, description.name);
-                scene.frames.push(Frame { name, world_from_frame: self.link(RobotId(index), link) });
+                scene
+                    .frames
+                    .push(Frame { name, world_from_frame: RobotState { one, physics: &self.physics }.of_link(link) });
             }
         }
         scene
+    }
+
+    fn check(&self, body: BodyId) -> Result<()> {
+        match self.bodies.get(body.0) {
+            Some(one) if mark(&one.name) == body.1 => Ok(()),
+            _ => {
+                let present = self.by_name.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
+                Err(Error::Elsewhere { what: "body", present })
+            }
+        }
     }
 
     fn check_free(&self, name: &str) -> Result<()> {
@@ -425,7 +447,7 @@ impl World {
         carrier: RigidBodyHandle,
         shapes: impl Iterator<Item = (Shape, Isometry3<f64>)>,
     ) -> BodyId {
-        let id = BodyId(self.bodies.len());
+        let id = BodyId(self.bodies.len(), mark(&name));
         let colliders = shapes.map(|(shape, carrier_from_shape)| {
             let (physical, shape_from_physical) = to_shape(&shape);
             let carrier_from_physical = carrier_from_shape * shape_from_physical;
@@ -441,6 +463,95 @@ impl World {
         self.bodies.push(BodyRecord { name: name.clone(), part, robot, carrier, colliders });
         self.by_name.insert(name, id);
         id
+    }
+}
+
+/// What the experiments of this crate ask of a world that they have made, with what it gave them.
+impl World {
+    pub(crate) fn own(&self, robot: RobotId) -> RobotState<'_> {
+        RobotState { one: &self.robots[robot.0], physics: &self.physics }
+    }
+
+    pub(crate) fn steer(&mut self, robot: RobotId, angles: &[f64]) {
+        let articulation = &mut self.robots[robot.0].articulation;
+        angles.iter().enumerate().for_each(|(joint, &angle)| articulation.go(joint, angle));
+    }
+
+    pub(crate) fn name_of(&self, body: BodyId) -> &str {
+        &self.bodies[body.0].name
+    }
+
+    pub(crate) fn pose_of(&self, body: BodyId) -> Isometry3<f64> {
+        let record = &self.bodies[body.0];
+        from_pose(self.physics.bodies[record.carrier].position()) * record.colliders[0].carrier_from_shape
+    }
+}
+
+/// A robot of a world, as it stands now.
+#[derive(Clone, Copy)]
+pub struct RobotState<'a> {
+    one: &'a PlacedRobot,
+    physics: &'a PhysicsWorld,
+}
+
+impl std::fmt::Debug for RobotState<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("RobotState").field("name", &self.one.name).field("angles", &self.angles()).finish()
+    }
+}
+
+impl<'a> RobotState<'a> {
+    /// Its description.
+    #[must_use]
+    pub fn description(&self) -> &'a Robot {
+        &self.one.description
+    }
+
+    /// Leads from its root to the world.
+    #[must_use]
+    pub fn world_from_root(&self) -> Isometry3<f64> {
+        self.one.world_from_root
+    }
+
+    /// True angles of its joints.
+    #[must_use]
+    pub fn angles(&self) -> Vec<f64> {
+        self.one.articulation.state(self.physics).map(|[angle, _]| angle).collect()
+    }
+
+    /// True velocities of its joints, in rad/s.
+    #[must_use]
+    pub fn velocities(&self) -> Vec<f64> {
+        self.one.articulation.state(self.physics).map(|[_, velocity]| velocity).collect()
+    }
+
+    /// How all joints stand that its description calls movable. Those that are [locked](Robot::lock) hold still.
+    #[must_use]
+    pub fn joint_states(&self) -> Vec<JointState<'a>> {
+        let velocities = self.velocities();
+        let velocity = |name: &str| self.description().joint(name).map_or(0.0, |index| velocities[index]);
+        let angles = self.description().all_angles(&self.angles());
+        angles.into_iter().map(|(name, angle)| JointState { name, angle, velocity: velocity(name) }).collect()
+    }
+
+    /// Where its joints are to go.
+    #[must_use]
+    pub fn goals(&self) -> Vec<f64> {
+        self.one.articulation.motors.iter().map(|motor| motor.goal).collect()
+    }
+
+    /// Leads from a link to the world; the index is the one in its description.
+    ///
+    /// # Errors
+    /// [`Error::NoSuch`] if there is no such link.
+    pub fn link(&self, link: usize) -> Result<Isometry3<f64>> {
+        let count = self.one.articulation.links.len();
+        if link < count { Ok(self.of_link(link)) } else { Err(Error::NoSuch { what: "link", index: link, count }) }
+    }
+
+    pub(crate) fn of_link(&self, link: usize) -> Isometry3<f64> {
+        let (carrier, carrier_from_link) = self.one.articulation.links[link];
+        from_pose(self.physics.bodies[carrier].position()) * carrier_from_link
     }
 }
 

@@ -191,7 +191,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         let message = format!("--observed {observed} leaves nothing to predict: the network's delay is {delay}");
         return Err(Failure::input(message, format!("observe at least {} samples", delay + 1)));
     }
-    let scaled = checkpoint.scaling.apply(&data);
+    let scaled = checkpoint.scaling.apply(&data)?;
     let engine = shared.engine()?;
     let heard = arguments.observed.unwrap_or(usize::MAX);
     let (mut recognitions, mut generated) = (Vec::new(), Vec::new());

@@ -48,7 +48,7 @@ pub struct Online {
     /// Start from the mean of the learned states, and stay with that
     #[arg(long, requires = "online", conflicts_with = "sequence")]
     mean: bool,
-    /// In the JSON object, show window and future at these samples, each 1 to 1000000000
+    /// In the JSON object, show the window and the forecast at these samples, each 1 to 1000000000
     #[arg(long, value_name = "K,...", value_delimiter = ',', requires_all = ["online", "json"],
         value_parser = crate::args::count(1, 1_000_000_000))]
     at: Vec<usize>,
@@ -273,7 +273,7 @@ impl<'a> Session<'a> {
             mean = raw(self.regression.mean());
             let v = self.regression.variance().iter().enumerate();
             variance = v.map(|(i, &v)| scaling.variance_to_raw(i, v)).collect();
-            forecast = (1..=ahead).map(|k| raw(self.regression.forecast_mean(k))).collect();
+            forecast = (1..=ahead).filter_map(|k| self.regression.forecast_mean(k)).map(raw).collect();
         }
         let missing = self.missing.iter().map(|&channel| channels[channel].as_str()).collect();
         Answer { sample, mean, variance, forecast, ln_likelihood, locked, milliseconds, missing }
@@ -290,15 +290,15 @@ impl<'a> Session<'a> {
         let raw_variance =
             |v: &[f64]| v.iter().enumerate().map(|(i, &v)| scaling.variance_to_raw(i, v)).collect::<Vec<_>>();
         let window = self.regression.window();
-        let future = if self.predicts() { 0..ahead + 1 } else { 0..0 };
+        let forecast = if self.predicts() { 0..ahead + 1 } else { 0..0 };
         let has_variance = self.trained.checkpoint.topology.has_variance();
         View {
             from: self.taken + 1 - window,
-            smoothed: (0..window).map(|k| raw(self.regression.smoothed_mean(k))).collect(),
-            contexts: (0..window).map(|k| self.regression.context(k).to_vec()).collect(),
-            predicted: future.clone().map(|k| raw(self.regression.forecast_mean(k))).collect(),
+            smoothed: (0..window).filter_map(|k| self.regression.smoothed_mean(k)).map(raw).collect(),
+            contexts: (0..window).filter_map(|k| self.regression.context(k)).map(<[f64]>::to_vec).collect(),
+            predicted: forecast.clone().filter_map(|k| self.regression.forecast_mean(k)).map(raw).collect(),
             variance: match has_variance {
-                true => future.map(|k| raw_variance(self.regression.forecast_variance(k))).collect(),
+                true => forecast.filter_map(|k| self.regression.forecast_variance(k)).map(raw_variance).collect(),
                 false => Vec::new(),
             },
         }
@@ -366,9 +366,9 @@ fn follow(online: &Online, how: &How<'_>, trained: &Trained, sequence: &Sequence
         let done = session.observe(sample)?;
         if k >= delay {
             let last = session.regression.window() - 1;
-            let smoothed = session.regression.smoothed_mean(last).iter().enumerate();
+            let smoothed = session.regression.smoothed_mean(last).into_iter().flatten().enumerate();
             rows.smoothed.extend(smoothed.map(|(i, &y)| scaling.to_raw(i, y)));
-            rows.context.extend_from_slice(session.regression.context(last));
+            rows.context.extend(session.regression.context(last).into_iter().flatten());
         }
         steps.push(session.told(&done, online.at.contains(&(k + 1)), online.ahead));
     }

@@ -6,8 +6,9 @@ use clap::Args;
 use scrnn::analysis::excursions::Side;
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions};
-use scrnn_sim::follower::{Branch, ControlStep, Controller, Followed, Outcome, follow, with_own_arm};
-use scrnn_sim::interaction::{CHANNELS, Interaction, InteractionOptions, letters, parse_order, random_order};
+use scrnn::streams::Purpose;
+use scrnn_sim::interact::{Branch, ControlStep, Controller, Followed, Outcome, follow, with_own_arm};
+use scrnn_sim::interact::{CHANNELS, Interaction, InteractionOptions, letters, parse_order, random_order};
 use serde::Serialize;
 use serde_json::json;
 
@@ -19,7 +20,7 @@ use scrnn_data::{self as files, Field};
 use scrnn_report::Table;
 use scrnn_run::failure::{Ending, Failure, Result};
 use scrnn_run::trained::Trained;
-use scrnn_sim::film::Film;
+use scrnn_sim::interact::Film;
 use scrnn_tasks::interact::BRANCHES;
 
 /// Two robots: the network follows the other robot's object with its arm
@@ -100,15 +101,14 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     let engine = shared.engine()?;
     let mut trials = Vec::new();
     for trial in 0..u64::from(arguments.trials) {
-        let seed = arguments.seed.wrapping_add(trial << 32);
         let order = match &arguments.order {
             Some(text) => parse_order(text)?,
-            None => random_order(BRANCHES, 0.5, seed),
+            None => random_order(BRANCHES, 0.5, arguments.seed, Purpose::TrialOrders, trial),
         };
         let (initial_state, state) = arguments.start(&trained, &order)?;
         let controller =
             Controller { network: &network, scaling: &checkpoint.scaling, initial_state: state, engine: &engine };
-        let mut interaction = Interaction::new(&order, &InteractionOptions::default(), seed)?;
+        let mut interaction = Interaction::new(&order, &InteractionOptions::default(), arguments.seed, trial)?;
         let mut deadline = arguments.regression.clock()?;
         if let Some(film) = &mut film {
             film.begin(&letters(&order))?;
@@ -216,7 +216,7 @@ fn write(path: &std::path::Path, trained: &Trained, trials: &[Trial]) -> Result<
     let (checkpoint, n) = (&trained.checkpoint, CHANNELS.len());
     let (scaling, delay) = (&checkpoint.scaling, checkpoint.topology.delay());
     let moments = |trial: &Trial| trial.followed.steps.get(delay..).unwrap_or_default().to_vec();
-    let field = |names: Vec<String>, of: &dyn Fn(&scrnn_sim::follower::ControlStep) -> Vec<f64>| -> Result<Dataset> {
+    let field = |names: Vec<String>, of: &dyn Fn(&scrnn_sim::interact::ControlStep) -> Vec<f64>| -> Result<Dataset> {
         let rows = trials
             .iter()
             .map(|trial| Sequence::new(trial.order.clone(), names.len(), moments(trial).iter().flat_map(of).collect()));

@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::Args;
-use scrnn_sim::agent::{NetworkDriver, Noise, Performance, Snapshot, perform};
-use scrnn_sim::channels::REACHING;
-use scrnn_sim::reaching::{CYCLE, POSITIONS};
-use scrnn_sim::reaching_recording::ReachingRecording;
-use scrnn_sim::touching::Cycle;
+use scrnn_sim::reach::agent::{NetworkDriver, Noise, Performance, Snapshot, perform};
+use scrnn_sim::reach::channels::REACHING;
+use scrnn_sim::reach::recording::ReachingRecording;
+use scrnn_sim::reach::stage::{CYCLE, POSITIONS};
+use scrnn_sim::reach::touching::Cycle;
 use scrnn_sim::world::WorldOptions;
 use serde::Serialize;
 
