@@ -11,7 +11,7 @@ const RUN: &str = "run/checkpoint.safetensors";
 fn noting(place: &Place, change: impl Fn(&mut Value)) {
     let mut checkpoint = Checkpoint::from_bytes(&place.read("whole.safetensors")).unwrap();
     change(&mut checkpoint.notes);
-    place.write(RUN, checkpoint.to_bytes());
+    place.write(RUN, checkpoint.to_bytes().unwrap());
 }
 
 fn trained() -> Place {

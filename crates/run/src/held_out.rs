@@ -131,7 +131,7 @@ impl Watch {
         let (Some(held_out), Some(options)) = (&source.held_out, &experiment.evaluation) else { return Ok(None) };
         let models = SimpleModels::fit(learned, delay);
         let shares = (options.burn_in, options.observed);
-        let bench = Bench::new(scaling.apply(held_out), models, shares, (delay, experiment.seed), engine)?;
+        let bench = Bench::new(scaling.apply(held_out)?, models, shares, (delay, experiment.seed), engine)?;
         let every = options.every.unwrap_or(1);
         Ok(Some(Self { bench, every, patience: experiment.training.patience }))
     }

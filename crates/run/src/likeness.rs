@@ -51,7 +51,7 @@ pub fn rank(
 /// c of every step while the network listens, from the state that all sequences share; `[sequence][step][unit]`.
 fn contexts(trained: &Trained, data: &Dataset, heard: usize, engine: &Engine) -> Result<Vec<Vec<f64>>> {
     let checkpoint = &trained.checkpoint;
-    let scaled = checkpoint.scaling.apply(data);
+    let scaled = checkpoint.scaling.apply(data)?;
     let n = scaled.channels().len();
     let mean = checkpoint.initial_states.mean();
     let samples = |own: &scrnn::dataset::Sequence| own.len().min(heard);

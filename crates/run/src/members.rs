@@ -178,7 +178,7 @@ pub fn judge(all: &[Trained], experiment: &Experiment, engine: &Engine) -> Resul
     let Some(first) = all.first().filter(|_| experiment.data.held_out.is_some()) else { return Ok(None) };
     let source = first.source(engine.threads())?;
     let checkpoint = &first.checkpoint;
-    let scaled = checkpoint.scaling.apply(&source.data);
+    let scaled = checkpoint.scaling.apply(&source.data)?;
     let watch = Watch::new(experiment, (&source, &checkpoint.scaling, &scaled), checkpoint.topology.delay(), engine)?;
     let Some(watch) = watch else { return Ok(None) };
     let networks: Vec<_> = all.iter().map(Trained::network).collect();

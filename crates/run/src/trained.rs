@@ -7,7 +7,7 @@ use scrnn::dataset::Dataset;
 use scrnn::network::Network;
 
 use crate::channels;
-use crate::experiment::{Evaluation, Experiment};
+use crate::experiment::Evaluation;
 use crate::failure::{Failure, Result};
 use crate::familiar;
 use crate::members;
@@ -107,7 +107,7 @@ impl Trained {
 
     /// How its experiment judges networks on what it holds out, or how that is done by default.
     pub fn evaluation(&self) -> Evaluation {
-        let experiment = self.notes.as_ref().and_then(|notes| Experiment::deserialize(&notes.experiment).ok());
+        let experiment = self.notes.as_ref().and_then(|notes| notes.experiment().ok());
         experiment.and_then(|experiment| experiment.evaluation).unwrap_or_default()
     }
 

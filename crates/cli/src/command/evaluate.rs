@@ -174,8 +174,8 @@ fn bench(
     let checkpoint = &trained.checkpoint;
     let delay = checkpoint.topology.delay();
     data.check_for(&checkpoint.topology)?;
-    let scaled = checkpoint.scaling.apply(data);
-    let learned = source.map(|source| checkpoint.scaling.apply(&source.data));
+    let scaled = checkpoint.scaling.apply(data)?;
+    let learned = source.map(|source| checkpoint.scaling.apply(&source.data)).transpose()?;
     let models = SimpleModels::fit(learned.as_ref().unwrap_or(&scaled), delay);
     let evaluation = trained.evaluation();
     let shares = (arguments.burn_in.unwrap_or(evaluation.burn_in), arguments.observed.unwrap_or(evaluation.observed));
@@ -204,6 +204,6 @@ fn calibrate(trained: &Trained, (bench, data, source): (&Bench, &Dataset, Option
     notes.variance_factor = Some(factor.clone());
     let mut checkpoint = trained.checkpoint.clone();
     checkpoint.notes = notes.to_value();
-    files::replace(&trained.path, &checkpoint.to_bytes())?;
+    files::replace(&trained.path, &checkpoint.to_bytes()?)?;
     Ok(Calibrated { factor, nll })
 }

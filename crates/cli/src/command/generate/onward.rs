@@ -26,7 +26,7 @@ pub fn fields(arguments: &Arguments, path: &Path, all: &[Trained], shared: &Shar
         let message = format!("--observed {observed} leaves nothing to predict: the network's delay is {delay}");
         return Err(Failure::input(message, format!("observe at least {} samples", delay + 1)));
     }
-    let scaled = checkpoint.scaling.apply(&data);
+    let scaled = checkpoint.scaling.apply(&data)?;
     let networks: Vec<_> = all.iter().map(Trained::network).collect();
     let mixture = members::mixed(all, &networks);
     shared.say(format_args!("the recognised state's uncertainty: {}", completion::UNCERTAINTY));

@@ -10,9 +10,7 @@ use crate::args::Shared;
 
 /// Whether all learned sequences of a run share one initial state.
 pub fn share_one_state(trained: &Trained) -> bool {
-    let variance =
-        trained.notes.as_ref().and_then(|notes| notes.experiment["network"]["initial_state_variance"].as_f64());
-    variance == Some(0.0)
+    trained.initial_state_variance() == 0.0
 }
 
 /// Ranks the learned sequences by likeness, in place of the likelihoods of their initial states, which are all the same.

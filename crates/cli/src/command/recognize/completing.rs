@@ -43,7 +43,7 @@ pub fn complete(
     (loops, seed): (usize, u64),
     engine: &Engine,
 ) -> Result<Vec<Option<Completion>>> {
-    let scaled = trained.checkpoint.scaling.apply(data);
+    let scaled = trained.checkpoint.scaling.apply(data)?;
     let of = |(s, sequence): (usize, &Sequence)| {
         if heard >= sequence.len() {
             return Ok(None);
