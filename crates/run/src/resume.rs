@@ -113,7 +113,8 @@ mod tests {
         let learner = Learner::new(network, initial_states, &data, Plan::default(), &Engine::serial()).unwrap();
         let notes = |numerics: &str| Notes {
             experiment: learned_part(&experiment),
-            data: DataNotes { digest: "0".to_owned(), lengths: vec![3], ranges: Vec::new() },
+            data: DataNotes { digest: "0".to_owned(), lengths: vec![3], ranges: Vec::new(), held_out: None },
+            variance_factor: None,
             numerics: numerics.to_owned(),
             score: None,
             best: None,

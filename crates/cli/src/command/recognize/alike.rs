@@ -22,7 +22,7 @@ pub fn rank(trained: &Trained, new: &Dataset, heard: usize, found: &mut [Found],
     let learned = match trained.learned_data(engine.threads()) {
         Ok(learned) => learned,
         Err(failure) => {
-            shared.say(&format!(
+            shared.say(format!(
                 "note: which learned sequences these are like is not told: all share one initial state, and what was learned cannot be \
                  read again ({failure})"
             ));

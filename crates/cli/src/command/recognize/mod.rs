@@ -204,9 +204,9 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     let mut found = (0..scaled.sequences().len())
         .map(|s| summary_of_all(&all, &data.sequences()[s], (&recognitions, &generated), s, heard))
         .collect::<Vec<_>>();
-    let by_likeness = alike::share_one_state(&trained);
+    let by_likeness = alike::share_one_state(trained);
     if by_likeness {
-        alike::rank(&trained, &data, heard, &mut found, shared)?;
+        alike::rank(trained, &data, heard, &mut found, shared)?;
     }
 
     if let Some(path) = &arguments.out {
