@@ -101,7 +101,8 @@ mod tests {
 
     #[test]
     fn a_run_goes_on_only_with_the_arithmetic_that_it_began_with() {
-        let text = "name = \"x\"\n[data]\ntask = \"sinusoid\"\n[[network.groups]]\nunits = 2\ntime_constant = 2.0\n";
+        let text = "name = \"x\"\n[data]\ntask = \"sinusoid\"\n[[network.groups]]\nname = \"context\"\nunits = 2\n\
+                    time_constant = 2.0\n[training]\nepochs = 1\noptimiser = \"adam\"\n";
         let experiment = crate::experiment::read_text("x.toml", text, &[]).unwrap();
         let data = scrnn::dataset::Dataset::new(
             vec!["y".to_owned()],
