@@ -188,7 +188,7 @@ fn changed_data_are_refused_and_moved_data_are_not() {
     let last = wave.trim_end().rfind('\n').unwrap();
     place.write("wave.csv", &wave[..last + 1]);
     let (_, told) = place.fails(5, "train run --resume --epochs 130");
-    assert!(told.contains("the data changed") && told.contains("[60] -> [59]"), "{told}");
+    assert!(told.contains("the data changed") && told.contains("samples in each sequence: 60 -> 59"), "{told}");
     let (_, told) = place.fails(2, "generate run --mode open");
     assert!(told.contains("the data changed") && told.contains("--data"), "{told}");
     place.write("elsewhere.csv", wave);

@@ -40,22 +40,22 @@ pub struct Arguments {
     data: Option<PathBuf>,
     #[command(flatten)]
     part: Part,
-    /// Share of each sequence that is listened to before predictions count [default: the experiment's, or 0.1]
+    /// Share of each sequence that is listened to before predictions count, 0 to 0.99 [default: the experiment's, or 0.1]
     #[arg(long, value_name = "SHARE", value_parser = share)]
     burn_in: Option<f64>,
-    /// Share of each sequence that is heard before the closed loop [default: the experiment's, or 0.3]
+    /// Share of each sequence that is heard before the closed loop, 0 to 0.99 [default: the experiment's, or 0.3]
     #[arg(long, value_name = "SHARE", value_parser = share)]
     observed: Option<f64>,
-    /// Closed loops of each sequence
+    /// Closed loops of each sequence, 1 to 10000
     #[arg(long, value_name = "N", default_value_t = 50, value_parser = count(1, 10_000))]
     samples: usize,
-    /// Starts of the search for each sequence's state
+    /// Starts of the search for each sequence's state, 1 to 10000
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = count(1, 10_000))]
     starts: usize,
-    /// Updates from each start
+    /// Updates from each start, 0 to 1000000
     #[arg(long, value_name = "N", default_value_t = 300, value_parser = clap::value_parser!(u64).range(0..=1_000_000))]
     epochs: u64,
-    /// Seed of the closed loops' noise
+    /// Seed of the closed loops' noise, 0 to 18446744073709551615
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Use the run's best network instead of its newest
@@ -69,10 +69,13 @@ pub struct Arguments {
     json: bool,
 }
 
+/// Something must be left to judge by.
+const LARGEST_SHARE: f64 = 0.99;
+
 fn share(text: &str) -> std::result::Result<f64, String> {
     match text.parse::<f64>() {
-        Ok(value) if (0.0..1.0).contains(&value) => Ok(value),
-        _ => Err("give a share from 0 to below 1".to_owned()),
+        Ok(value) if (0.0..=LARGEST_SHARE).contains(&value) => Ok(value),
+        _ => Err(format!("give a share from 0 to {LARGEST_SHARE}")),
     }
 }
 
