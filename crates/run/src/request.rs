@@ -202,7 +202,9 @@ fn plain(path: &[String]) -> String {
 
 /// The table of an experiment file that leaves settings to a recipe. What cannot be read is left to whoever says why.
 fn asks_for_recipe(file: &Path) -> Option<toml::Table> {
-    let table: toml::Table = toml::from_str(&std::fs::read_to_string(file).ok()?).ok()?;
+    // What is no file has no end, perhaps.
+    let text = if file.is_file() { std::fs::read_to_string(file).ok()? } else { return None };
+    let table: toml::Table = toml::from_str(&text).ok()?;
     let recipe = table.get("training")?.get("recipe")?.as_str()?;
     (recipe == "auto").then_some(table)
 }
