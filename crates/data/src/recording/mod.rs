@@ -242,7 +242,7 @@ fn section(
         if !found.is_empty() {
             remarks.push(Remark::Resampled { period: period as f64 / 1e9, found });
         }
-        if joined.cut > 10 * period {
+        if joined.cut > period.saturating_mul(10) {
             let what = format!(
                 "sequence {sequence}: {} s were cut off at its ends, where not all channels are there",
                 crate::times::seconds(joined.cut)
