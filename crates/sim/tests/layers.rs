@@ -4,14 +4,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each folder or file with what it may use of the crate.
-const MAY_USE: [(&str, &[&str]); 7] = [
+const MAY_USE: [(&str, &[&str]); 6] = [
     ("error.rs", &[]),
-    ("streams.rs", &[]),
     ("robot", &["error"]),
     ("world", &["error", "robot"]),
     ("recording", &["error", "robot", "world"]),
-    ("reach", &["error", "streams", "robot", "world", "recording"]),
-    ("interact", &["error", "streams", "robot", "world", "recording"]),
+    ("reach", &["error", "robot", "world", "recording"]),
+    ("interact", &["error", "robot", "world", "recording"]),
 ];
 
 fn sources(path: &Path) -> Vec<PathBuf> {
