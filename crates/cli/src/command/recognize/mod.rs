@@ -429,8 +429,11 @@ fn table(found: &[Found], completed: bool, by_likeness: bool) -> String {
         let named = learned.iter().take(NAMED).map(|one| {
             let name =
                 if one.sequence == one.number.to_string() { String::new() } else { format!(" {}", one.sequence) };
-            let value = one.ln_likelihood.or(one.distance);
-            let value = value.map_or(String::new(), |value| format!(" ({value:.4})"));
+            let value = match (one.ln_likelihood, one.distance) {
+                (Some(value), _) => format!(" ({value:.4})"),
+                (None, Some(distance)) => format!(" ({distance:.1e})"),
+                (None, None) => String::new(),
+            };
             format!("{}{name}{value}", one.number)
         });
         row.push(named.collect::<Vec<_>>().join(", "));
