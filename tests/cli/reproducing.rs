@@ -145,10 +145,13 @@ fn most_threads(place: &Place, line: &str) -> usize {
 fn one_thread_means_one_for_seeds_and_worlds_alike() {
     let place = Place::new();
     for line in ["reproduce sinusoid --epochs 600 --seeds 3", "data reach --sequences 4 --steps 24"] {
-        let most = |threads: usize| {
-            most_threads(&place, &format!("{line} --threads {threads} --out {}-{threads}.csv", line.len()))
+        let most = |threads: usize, attempt: usize| {
+            let out = format!("{}-{threads}-{attempt}.csv", line.len());
+            most_threads(&place, &format!("{line} --threads {threads} --out {out}"))
         };
-        let (one, two) = (most(1), most(2));
+        let one = most(1, 0);
+        // Threads that live shortly are not seen by every look on a busy machine.
+        let two = (0..10).map(|attempt| most(2, attempt)).find(|two| *two > one).unwrap_or(0);
         // One waits for signals, one writes what is said.
         assert!((1..=3).contains(&one) && two > one, "{line}: {one} and {two} threads");
     }
