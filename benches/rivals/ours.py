@@ -1,4 +1,4 @@
-"""scrnn through its command line. The one file to change when the program learns more: see "The seam" below.
+"""scrnn through its command line. Nothing is chosen for it: it trains on the data alone, as for anybody.
 
 The program is `scrnn` in the folder target/release, or what the environment variable SCRNN names.
 """
