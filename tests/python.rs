@@ -1,42 +1,22 @@
 //! Python beside the program: numpy and pandas write what it reads and read what it writes, numpy computes from a
 //! checkpoint what it generates, and mcap reads recordings.
 //!
-//! The interpreter is SCRNN_PYTHON, else the one in .venv, which .ci/run makes. It needs what
-//! tests/python/requirements.txt lists. Without one these tests say that they were skipped; where CI is set, they fail.
+//! The interpreter is that of tests/python/interpreter.rs.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use scrnn_sim::recording::{Contact, Heading, Joint, Recorder, Robot};
 use scrnn_sim::world::scene::{Body, Frame, Part, Scene, Shape};
 
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
+#[path = "python/interpreter.rs"]
+mod interpreter;
 
-/// What the scripts use.
-const IMPORTS: &str = "import numpy, pandas, safetensors, mcap, mcap_protobuf, foxglove_schemas_protobuf";
+use interpreter::root;
 
 /// An interpreter that has all packages.
 fn python() -> Option<PathBuf> {
-    let venv = if cfg!(windows) { ".venv/Scripts/python.exe" } else { ".venv/bin/python" };
-    let python = std::env::var_os("SCRNN_PYTHON").map_or_else(|| root().join(venv), PathBuf::from);
-    let import = Command::new(&python).args(["-c", IMPORTS]).output();
-    match import {
-        Ok(output) if output.status.success() => Some(python),
-        found => {
-            let why = found.map_or_else(|error| error.to_string(), |output| text(&output.stderr));
-            let why = why.lines().last().unwrap_or_default().to_owned();
-            let message =
-                format!("no Python with what tests/python/requirements.txt lists: {}: {why}", python.display());
-            assert!(std::env::var_os("CI").is_none(), "{message}");
-            // Past the test harness, which shows nothing of a test that passes.
-            let mut terminal = std::io::stderr().lock();
-            writeln!(terminal, "skipped: {message}; .ci/run makes one").unwrap();
-            None
-        }
-    }
+    interpreter::python("numpy, pandas, safetensors, mcap, mcap_protobuf, foxglove_schemas_protobuf")
 }
 
 fn text(bytes: &[u8]) -> String {

@@ -1,36 +1,21 @@
 //! Data that people have, written by software that is not ours: each is learned, generated and recognised by one command
 //! each, without an experiment file.
 //!
-//! The interpreter is SCRNN_PYTHON, else the one in .venv, which .ci/run makes. Without one that has the packages of
-//! tests/python/requirements.txt these tests say that they were skipped; where CI is set, they fail.
+//! The interpreter is that of tests/python/interpreter.rs.
 
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Output};
 
 use serde_json::Value;
 
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
+#[path = "python/interpreter.rs"]
+mod interpreter;
+
+use interpreter::root;
 
 /// An interpreter that has all packages.
 fn python() -> Option<PathBuf> {
-    let venv = if cfg!(windows) { ".venv/Scripts/python.exe" } else { ".venv/bin/python" };
-    let python = std::env::var_os("SCRNN_PYTHON").map_or_else(|| root().join(venv), PathBuf::from);
-    let import = "import numpy, h5py, pyarrow, scipy.io, rosbags, mcap_ros2, mcap_protobuf, foxglove_schemas_protobuf";
-    let found = Command::new(&python).args(["-c", import]).output();
-    if found.as_ref().is_ok_and(|output| output.status.success()) {
-        return Some(python);
-    }
-    let why =
-        found.map_or_else(|error| error.to_string(), |output| String::from_utf8_lossy(&output.stderr).into_owned());
-    let why = why.lines().last().unwrap_or_default().to_owned();
-    let message = format!("no Python with what tests/python/requirements.txt lists: {}: {why}", python.display());
-    assert!(std::env::var_os("CI").is_none(), "{message}");
-    // Past the test harness, which shows nothing of a test that passes.
-    writeln!(std::io::stderr().lock(), "skipped: {message}; .ci/run makes one").unwrap();
-    None
+    interpreter::python("numpy, h5py, pyarrow, scipy.io, rosbags, mcap_ros2, mcap_protobuf, foxglove_schemas_protobuf")
 }
 
 /// A folder with all movements.

@@ -347,7 +347,7 @@ fn nothing_is_left_undone() {
     let mut problems = Vec::new();
     for source in sources().iter().filter(|source| source.path != "tests/tidy.rs") {
         for (index, line) in source.text.lines().enumerate() {
-            for word in ["todo!", "unimplemented!", "TODO", "FIXME", "#[ignore]"] {
+            for word in ["todo!", "unimplemented!", "TODO", "FIXME", "#[ignore"] {
                 if line.contains(word) {
                     problems.push(format!("{}:{}: {word}", source.path, index + 1));
                 }

@@ -161,23 +161,10 @@ fn alone(files: &[PathBuf], overrides: &[Override], out: Option<&Path>, resume: 
         let experiment = experiment::read(&begun.join(EXPERIMENT), &all)?.resolved(&begun)?;
         return Ok(Asked { experiment, source: None, folder: begun });
     }
-    // How the data are read is known before they are; what suits them, after.
-    let of_data = |change: &&Override| change.path.first().is_some_and(|part| part == "data");
-    let reading: Vec<Override> = overrides.iter().filter(of_data).cloned().collect();
     let files = Data { files: Some(files.to_vec()), ..Data::default() };
-    let first = Experiment { name: name.clone(), data: files, ..recipe::bare() };
-    let first = experiment::read_text("the experiment", &first.to_file(), &reading)?;
-    let mut source = source::load(&first.clone().resolved(Path::new(""))?.data, 1)?;
-
-    let Recipe { scaling, rest, network, training, reasons } = recipe::choose(&source.data);
-    let scaling = first.data.scaling.clone().unwrap_or(ScalingChoice::Named(scaling));
-    if first.data.rest.is_none()
-        && let Some(rest) = rest
-    {
-        source.data = source::held(&source.data, rest)?;
-    }
-    let data = Data { scaling: Some(scaling), rest: first.data.rest.or(rest), ..first.data };
-    let chosen = Experiment { name, data, network, training, ..recipe::bare() };
+    let first = Experiment { name, data: files, ..recipe::bare() };
+    let first = experiment::read_text("the experiment", &first.to_file(), &of_data(overrides))?;
+    let (chosen, source, reasons) = choose(first, Path::new(""))?;
     let mut experiment =
         experiment::read_text("the experiment", &chosen.to_file(), overrides)?.resolved(Path::new(""))?;
     let given = |key: &str| overrides.iter().any(|change| plain(&change.path) == key);
@@ -188,6 +175,26 @@ fn alone(files: &[PathBuf], overrides: &[Override], out: Option<&Path>, resume: 
     let from = format!("From {}.", listed.join(", "));
     experiment.comments.insert(0, Comment { key: "data.files".to_owned(), text: from });
     Ok(Asked::of(experiment, Some(source), out))
+}
+
+/// The options that say how data are read: that is known before they are; what suits them, after.
+fn of_data(overrides: &[Override]) -> Vec<Override> {
+    overrides.iter().filter(|change| change.path.first().is_some_and(|part| part == "data")).cloned().collect()
+}
+
+/// Reads the data of an experiment that says no more than that, and puts in what the recipe chooses for them, with its reasons.
+fn choose(first: Experiment, folder: &Path) -> Result<(Experiment, Source, Vec<Comment>)> {
+    let mut source = source::load(&first.clone().resolved(folder)?.data, 1)?;
+    let Recipe { scaling, rest, network, training, reasons } = recipe::choose(&source.data);
+    if let (None, Some(rest)) = (first.data.rest, rest) {
+        source.data = source::at_rest(&source.data, rest)?;
+    }
+    let data = Data {
+        scaling: first.data.scaling.clone().or(Some(ScalingChoice::Named(scaling))),
+        rest: first.data.rest.or(rest),
+        ..first.data
+    };
+    Ok((Experiment { data, network, training, ..first }, source, reasons))
 }
 
 /// The key of a comment: groups have no names in it.
@@ -220,25 +227,13 @@ fn by_recipe((file, given): (&Path, toml::Table), overrides: &[Override], out: O
             first.insert(key.to_owned(), value.clone());
         }
     }
-    let of_data = |change: &&Override| change.path.first().is_some_and(|part| part == "data");
-    let reading: Vec<Override> = overrides.iter().filter(of_data).cloned().collect();
     let text = |table: &toml::Table| toml::to_string(table).expect("a table that was read can be written");
-    let first = experiment::read_text(&name, &text(&first), &reading)?;
+    let first = experiment::read_text(&name, &text(&first), &of_data(overrides))?;
     if first.data.task.is_some() {
         let message = "`training.recipe` chooses settings for data from files, and these are a task of the thesis";
         return Err(Failure::input(message, "leave recipe out: assets/experiments has settings for the tasks"));
     }
-    let mut source = source::load(&first.clone().resolved(folder)?.data, 1)?;
-    let Recipe { scaling, rest, network, training, reasons } = recipe::choose(&source.data);
-    let data = Data {
-        scaling: first.data.scaling.clone().or(Some(ScalingChoice::Named(scaling))),
-        rest: first.data.rest.or(rest),
-        ..first.data.clone()
-    };
-    if let (None, Some(rest)) = (first.data.rest, rest) {
-        source.data = source::held(&source.data, rest)?;
-    }
-    let chosen = Experiment { data, network, training, ..first };
+    let (chosen, source, reasons) = choose(first, folder)?;
     let mut whole = toml::Table::try_from(&chosen).expect("an experiment is a table");
     let mut own = given;
     if let Some(training) = own.get_mut("training").and_then(toml::Value::as_table_mut) {

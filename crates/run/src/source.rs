@@ -80,7 +80,7 @@ pub fn load(data: &Data, threads: usize) -> Result<Source> {
     let Reading { data, period, mut remarks, .. } = read_all(files, &data.selection())?;
     let suspicions = suspicions::look(&data).into_iter();
     let data = match rest {
-        Some(rest) if rest > 0.0 => held(&data, rest)?,
+        Some(rest) if rest > 0.0 => at_rest(&data, rest)?,
         _ => data,
     };
     remarks.extend(suspicions.map(|suspicion| Remark::Suspicion { suspicion }));
@@ -90,8 +90,8 @@ pub fn load(data: &Data, threads: usize) -> Result<Source> {
 /// Holds the last sample of each sequence for a share of its length.
 ///
 /// # Errors
-/// None: the sequences are as sound as they were.
-pub fn held(data: &Dataset, share: f64) -> Result<Dataset> {
+/// None where the sequences are sound: they only grow.
+pub fn at_rest(data: &Dataset, share: f64) -> Result<Dataset> {
     let n = data.channels().len();
     let longer = |sequence: &Sequence| {
         let count = (share * sequence.len() as f64).round() as usize;
@@ -138,8 +138,8 @@ mod tests {
     fn the_last_sample_is_held() {
         let sequence = Sequence::new("a", 2, vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]).unwrap();
         let data = Dataset::new(Dataset::numbered_channels(2), vec![sequence]).unwrap();
-        assert_eq!(held(&data, 0.5).unwrap().sequences()[0].values()[8..], [7.0, 8.0, 7.0, 8.0]);
-        assert_eq!(held(&data, 0.1).unwrap(), data);
+        assert_eq!(at_rest(&data, 0.5).unwrap().sequences()[0].values()[8..], [7.0, 8.0, 7.0, 8.0]);
+        assert_eq!(at_rest(&data, 0.1).unwrap(), data);
     }
 
     #[test]

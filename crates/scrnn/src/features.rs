@@ -161,6 +161,10 @@ pub(crate) fn positive(what: &'static str, values: &[f64]) -> Result<()> {
 
 #[cfg(feature = "analysis")]
 /// The taps that predict what the last sample leaves over, from differences, by ridge least squares.
+///
+/// Not by the factors of `analysis::baselines`, which find the least squares however alike the regressors are: neighbouring differences
+/// of a smooth movement are nearly the same, and taps that make the most of that can be large, which a closed loop does not bear. The ridge
+/// keeps them small, and bounds the condition of the normal equations.
 fn fit_taps(data: &Dataset, delay: usize, lags: usize) -> Vec<f64> {
     let n = data.channels().len();
     let width = lags * n;

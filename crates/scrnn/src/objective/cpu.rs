@@ -294,22 +294,15 @@ impl CpuObjective {
             if self.is_taught(run) { &mut taught } else { &mut others }.push(index);
         }
         let mut found = self.found.take().unwrap_or_else(|| Box::new(Evaluation::new(&self.topology)));
-        let (mut some, mut some_initial) = (std::mem::take(&mut self.some), std::mem::take(&mut self.some_initial));
-        let mut take = |which: &[usize]| {
-            some.clear();
-            some_initial.clear();
-            for &index in which {
-                some.push(runs[index]);
-                some_initial.extend_from_slice(&initial[index * n_c..(index + 1) * n_c]);
-            }
-            (std::mem::take(&mut some), std::mem::take(&mut some_initial))
-        };
         evaluation.gradients.as_mut_slice().fill(0.0);
         for (which, way) in [(&taught, true), (&others, false)] {
             if which.is_empty() {
                 continue;
             }
-            let (own, own_initial) = take(which);
+            let (mut own, mut own_initial) = (std::mem::take(&mut self.some), std::mem::take(&mut self.some_initial));
+            (own.clear(), own_initial.clear());
+            own.extend(which.iter().map(|&index| runs[index]));
+            which.iter().for_each(|&index| own_initial.extend_from_slice(&initial[index * n_c..(index + 1) * n_c]));
             found.resize(own.len());
             match way {
                 true => self.evaluate_taught(&own, &own_initial, want, &mut found),
