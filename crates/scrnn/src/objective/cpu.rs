@@ -300,7 +300,8 @@ impl CpuObjective {
                 continue;
             }
             let (mut own, mut own_initial) = (std::mem::take(&mut self.some), std::mem::take(&mut self.some_initial));
-            (own.clear(), own_initial.clear());
+            own.clear();
+            own_initial.clear();
             own.extend(which.iter().map(|&index| runs[index]));
             which.iter().for_each(|&index| own_initial.extend_from_slice(&initial[index * n_c..(index + 1) * n_c]));
             found.resize(own.len());
