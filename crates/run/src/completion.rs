@@ -13,7 +13,17 @@ use scrnn::engine::Engine;
 use scrnn::recognition::{Recognition, Trial};
 
 use crate::evaluation::{self, Member, Rest};
-use crate::failure::Result;
+use crate::failure::{Failure, Result};
+
+/// Refuses a beginning in which a network of this delay predicts nothing.
+///
+/// # Errors
+/// [`Failure::Input`] with the least number of samples.
+pub fn check_observed(observed: Option<usize>, delay: usize) -> Result<()> {
+    let Some(observed) = observed.filter(|observed| *observed <= delay) else { return Ok(()) };
+    let message = format!("--observed {observed} leaves nothing to predict: the network's delay is {delay}");
+    Err(Failure::input(message, format!("observe at least {} samples", delay + 1)))
+}
 
 /// For each of `count` loops, the state that it begins from.
 pub fn states(recognition: &Recognition, count: usize) -> Vec<&[f64]> {

@@ -13,6 +13,7 @@
 //! | [`trained`], [`channels`] | a trained network as it is found again, and new data brought to its channels by name |
 //! | [`stream`] | samples that come line by line while they are made |
 //! | [`assessment`], [`truth`], [`channel_scores`] | how well it predicts, beside simple models and what is known of the noise |
+//! | [`generating`], [`recognising`], [`following`] | what a trained network is used for, in the data's units |
 //! | [`familiar`] | new data beside the range of what was learned |
 //! | [`conversion`] | data from one kind of file to another |
 //! | [`likeness`] | which learned sequence a new one is like, where all share one initial state |
@@ -37,6 +38,8 @@ pub mod evaluation;
 pub mod experiment;
 pub mod failure;
 pub mod familiar;
+pub mod following;
+pub mod generating;
 pub mod held_out;
 pub mod history;
 pub mod interrupt;
@@ -46,6 +49,7 @@ pub mod memory;
 pub mod messages;
 pub mod notes;
 pub mod recipe;
+pub mod recognising;
 pub mod request;
 pub mod resume;
 pub mod run_folder;

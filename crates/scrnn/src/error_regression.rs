@@ -448,6 +448,14 @@ impl ErrorRegression {
         (self.terms[..len].iter().sum(), self.squares[..len].iter().sum())
     }
 
+    /// How many values of the window count: those that are there, on channels of a share above 0.
+    fn values(&self) -> usize {
+        let n_y = self.packed.n_y;
+        let window = self.samples[self.delay * n_y..][..self.length * n_y].chunks_exact(n_y);
+        let counts = |row: &[f64]| row.iter().zip(&self.options.mask).filter(|(x, s)| !x.is_nan() && **s > 0.0).count();
+        window.map(counts).sum()
+    }
+
     /// d ln L_reg / du of the window's tail, left in the first delta row (2.22).
     #[inline(always)]
     fn run_back<S: Simd>(&mut self, simd: S) {
@@ -585,7 +593,8 @@ impl WithSimd for Regress<'_> {
         let Self { regression, go_on } = self;
         regression.first.fill(0.0);
         regression.second.fill(0.0);
-        let mut done = Regression { steps: regression.length, ..Regression::default() };
+        let (steps, values) = (regression.length, regression.values());
+        let mut done = Regression { steps, values, ..Regression::default() };
         let n_c = regression.packed.n_c;
         while done.iterations < regression.options.iterations && go_on() {
             regression.run_window(simd);

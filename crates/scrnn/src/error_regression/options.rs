@@ -121,6 +121,8 @@ impl ErrorRegressionOptions {
 pub struct Regression {
     /// Steps in the window.
     pub steps: usize,
+    /// Values in the window that are there, on channels of a share above 0 in the mask: what the likelihood is a sum over.
+    pub values: usize,
     /// Iterations that were made.
     pub iterations: usize,
     /// ln L_reg of the closed-loop window before the first iteration and after the last; -E without variance units.

@@ -5,8 +5,8 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use scrnn::error_regression::{Ascent, ErrorRegressionOptions};
 
-use super::deadline::Deadline;
 use scrnn_run::failure::{Failure, Result};
+use scrnn_run::following::Deadline;
 
 /// Options of error regression.
 #[derive(Debug, Args)]

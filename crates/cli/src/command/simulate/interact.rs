@@ -13,12 +13,13 @@ use serde::Serialize;
 use serde_json::json;
 
 use crate::args::Shared;
-use crate::command::recognize::{Latency, RegressionArguments};
+use crate::command::recognize::RegressionArguments;
 use crate::output;
 use crate::outputs::check_distinct;
 use scrnn_data::{self as files, Field};
 use scrnn_report::Table;
 use scrnn_run::failure::{Ending, Failure, Result};
+use scrnn_run::following::Latency;
 use scrnn_run::trained::Trained;
 use scrnn_sim::interact::Film;
 use scrnn_tasks::interact::BRANCHES;
@@ -224,7 +225,7 @@ fn write(path: &std::path::Path, trained: &Trained, trials: &[Trial]) -> Result<
         Ok(Dataset::new(names, rows)?)
     };
     let channels = || checkpoint.channels.clone();
-    let units = checkpoint.topology.groups().iter().flat_map(crate::command::generate::unit_names).collect();
+    let units = checkpoint.topology.groups().iter().flat_map(scrnn_run::generating::unit_names).collect();
     let sensed = field(channels(), &|moment| moment.sensed.to_vec())?;
     let mean = field(channels(), &|moment| {
         let predicted = moment.predicted.unwrap_or_default();

@@ -1,27 +1,20 @@
 //! `scrnn generate`: lets a trained network run (thesis 2.8).
 
-mod onward;
-mod starts;
-
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use scrnn::checkpoint::Checkpoint;
 use scrnn::dataset::{Dataset, Sequence};
-use scrnn::generation::{ChannelFeedback, Feedback, Generated, GenerationOptions, Start, generate};
 use serde_json::{Value, json};
 
 use crate::args::{Part, Shared};
 use crate::output;
 use crate::outputs::check_distinct;
 use scrnn_data::{self as files, Field};
-use scrnn_run::evaluation::Rest;
-use scrnn_run::failure::{Ending, Failure, Result};
+use scrnn_run::completion::UNCERTAINTY;
+use scrnn_run::failure::{Ending, Result};
+use scrnn_run::generating::{From, Generating, Onward, generating, given_states, onward};
 use scrnn_run::members;
 use scrnn_run::trained::Trained;
-use starts::Row;
-
-pub use starts::unit_names;
 
 /// Let a trained network generate sequences
 ///
@@ -111,9 +104,6 @@ enum Mode {
     Mixed,
 }
 
-/// What is written: names and values.
-type Fields = Vec<(&'static str, Dataset)>;
-
 /// Generates.
 pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     let files = [&arguments.initial_state, &arguments.data, &arguments.from].map(Option::as_deref);
@@ -126,9 +116,22 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     check_distinct(&[("--out", arguments.out.as_deref())], &named)?;
     let all = members::open(&arguments.run, arguments.best)?;
     all.iter().for_each(|trained| shared.say_of(trained));
+    let Some(trained) = all.first() else { return Ok(Ending::Done) };
+    let engine = shared.engine()?;
+    let read = |path: &PathBuf| -> Result<Dataset> {
+        let data = files::read_all(&[path], &arguments.part.of(path, trained.selection()))?.data;
+        trained.fitted_aloud(data, path, shared)
+    };
     let fields = match &arguments.from {
-        Some(path) => onward::fields(arguments, path, &all, shared)?,
-        None => mixed(arguments, &all, shared)?,
+        Some(path) => {
+            let Arguments { observed, steps, samples, seed, .. } = *arguments;
+            shared.say(format_args!("the recognised state's uncertainty: {UNCERTAINTY}"));
+            onward(&all, &read(path)?, Onward { observed, steps, samples: samples as usize, seed }, &engine)?
+        }
+        None => {
+            let data = arguments.data.as_ref().map(read).transpose()?;
+            generating(&all, &arguments.options(trained, data)?, &engine)?
+        }
     };
     if arguments.json {
         output::print_json_line(&as_json(&fields))?;
@@ -142,110 +145,26 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     Ok(Ending::Done)
 }
 
-/// What one network generates; or a mixture, each member in loops of its own: the moments are those of the mixture, the samples those of
-/// its members in turn.
-fn mixed(arguments: &Arguments, all: &[Trained], shared: &Shared) -> Result<Fields> {
-    if all.len() > 1 && (arguments.initial_state.is_some() || arguments.contexts) {
-        let message = "initial states and contexts are those of one network, and this is a mixture";
-        return Err(Failure::input(
-            message,
-            format!("give one of its members: {}", members::folder(&arguments.run, 1).display()),
-        ));
+impl Arguments {
+    fn options(&self, trained: &Trained, data: Option<Dataset>) -> Result<Generating> {
+        let from = match (&self.initial_state, &self.sequence) {
+            (Some(path), _) => From::Given(given_states(path, &trained.checkpoint)?),
+            (None, Some(wanted)) => From::Sequence(wanted.clone()),
+            (None, None) if self.mean => From::Mean,
+            (None, None) => From::Learned,
+        };
+        let sensed = match self.mode {
+            Mode::Open => 1.0,
+            Mode::Closed => 0.0,
+            Mode::Mixed => self.mixing,
+        };
+        Ok(Generating::with(|it| {
+            (it.from, it.sensed, it.data) = (from, sensed, data);
+            (it.open_channels, it.noise) = (self.open_channels.clone(), !self.no_noise);
+            (it.steps, it.samples, it.seed) = (self.steps, self.samples as usize, self.seed);
+            it.contexts = self.contexts;
+        }))
     }
-    let mut each = Vec::new();
-    let mut of_first = Vec::new();
-    for (m, trained) in all.iter().enumerate() {
-        let feedback = feedback(arguments, &trained.checkpoint)?;
-        let rows = starts::rows(
-            (arguments, trained),
-            (shared, shared.engine()?.threads()),
-            feedback.0.iter().any(|channel| channel.sensed > 0.0),
-        )?;
-        let starts: Vec<Start<'_>> =
-            rows.iter().map(|row| Start { initial_state: &row.state, sensed: &row.sensed }).collect();
-        let options = GenerationOptions::new(rows.iter().map(|row| row.steps).max().unwrap_or(0), feedback)
-            .seed(arguments.seed.wrapping_add(m as u64))
-            .contexts(arguments.contexts);
-        each.push(generate(&trained.network(), &starts, &options, &shared.engine()?)?);
-        if m == 0 {
-            of_first = rows;
-        }
-    }
-    let Some(trained) = all.first() else { return Ok(Vec::new()) };
-    let generated: Vec<Generated> = match each.as_slice() {
-        [_] => each.swap_remove(0),
-        _ => (0..of_first.len()).map(|row| mixture(&each, row)).collect(),
-    };
-    fields(&trained.checkpoint, &of_first, &generated)
-}
-
-/// The moments of what the members generated in a row, and the sample of one of them.
-fn mixture(each: &[Vec<Generated>], row: usize) -> Generated {
-    let loops: Vec<Generated> = each.iter().map(|one| one[row].clone()).collect();
-    let mut rest = Rest::of(&loops, 0);
-    let mut generated = Generated::default();
-    generated.sample = rest.samples.swap_remove(row % each.len());
-    (generated.mean, generated.variance) = (rest.mean, rest.variance);
-    generated
-}
-
-/// How each channel is fed.
-fn feedback(arguments: &Arguments, checkpoint: &Checkpoint) -> Result<Feedback> {
-    let (n, noise) = (checkpoint.channels.len(), !arguments.no_noise);
-    let sensed = match arguments.mode {
-        Mode::Open => 1.0,
-        Mode::Closed => 0.0,
-        Mode::Mixed => arguments.mixing,
-    };
-    let mut feedback = Feedback::mixed(n, sensed, noise);
-    for name in &arguments.open_channels {
-        let channel = checkpoint.channels.iter().position(|channel| channel == name).ok_or_else(|| {
-            let help = format!("the channels are {}", checkpoint.channels.join(", "));
-            Failure::input(format!("the network has no channel `{name}`"), help)
-        })?;
-        feedback.0[channel] = ChannelFeedback { sensed: 1.0, noise };
-    }
-    Ok(feedback)
-}
-
-/// Mean, variance, sample and contexts of all rows, in the data's units, each row as long as it should be.
-fn fields(checkpoint: &Checkpoint, rows: &[Row], generated: &[Generated]) -> Result<Fields> {
-    let scaling = &checkpoint.scaling;
-    let n = checkpoint.channels.len();
-    let field = |channels: &[String], of: &dyn Fn(&Generated) -> Vec<f64>| -> Result<Dataset> {
-        let mut sequences = Vec::with_capacity(rows.len());
-        for (row, generated) in rows.iter().zip(generated) {
-            let mut values = of(generated);
-            values.truncate(row.steps * channels.len());
-            check_finite(&row.name, &values, channels.len())?;
-            sequences.push(Sequence::new(row.name.clone(), channels.len(), values)?);
-        }
-        Ok(Dataset::new(channels.to_vec(), sequences)?)
-    };
-    let raw = |values: &[f64]| values.iter().enumerate().map(|(k, &x)| scaling.to_raw(k % n, x)).collect::<Vec<_>>();
-    let raw_variance = |generated: &Generated| {
-        generated.variance.iter().enumerate().map(|(k, &v)| scaling.variance_to_raw(k % n, v)).collect::<Vec<_>>()
-    };
-    let mut fields = vec![("mean", field(&checkpoint.channels, &|generated| raw(&generated.mean))?)];
-    if checkpoint.topology.has_variance() {
-        fields.push(("variance", field(&checkpoint.channels, &raw_variance)?));
-    }
-    fields.push(("sample", field(&checkpoint.channels, &|generated| raw(&generated.sample))?));
-    if generated.iter().any(|generated| !generated.contexts.is_empty()) {
-        let names: Vec<String> = checkpoint.topology.groups().iter().flat_map(starts::unit_names).collect();
-        fields.push(("context", field(&names, &|generated| generated.contexts.clone())?));
-    }
-    Ok(fields)
-}
-
-/// Refuses values of the sequence `name` that are not finite.
-fn check_finite(name: &str, values: &[f64], channels: usize) -> Result<()> {
-    let Some(index) = values.iter().position(|value| !value.is_finite()) else { return Ok(()) };
-    let step = index / channels + 1;
-    Err(Failure::input(
-        format!("sequence {name} left the finite numbers at step {step}"),
-        "the network predicts variances without bound here: try --no-noise, or train it further",
-    ))
 }
 
 /// For each sequence, its name and its fields as lists of rows.

@@ -1,42 +1,44 @@
-//! `scrnn recognize --observed N --samples K`: the rest of each sequence as a distribution.
+//! The rest of each sequence as a distribution.
 
+use crate::assessment::Predictions;
+use crate::channel_scores::observed_error;
+use crate::completion::{UNCERTAINTY, effective_states, forecast};
+use crate::evaluation::{Member, Rest};
+use crate::failure::Result;
+use crate::generating::Fields;
+use crate::trained::Trained;
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::engine::Engine;
 use scrnn::recognition::Recognition;
-use scrnn_run::assessment::Predictions;
-use scrnn_run::channel_scores::observed_error;
-use scrnn_run::completion::{UNCERTAINTY, effective_states, forecast};
-use scrnn_run::evaluation::{Member, Rest};
-use scrnn_run::failure::Result;
-use scrnn_run::trained::Trained;
 use serde::Serialize;
 
 /// The rest of one sequence, in the data's units where nothing else is said.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
 pub struct Completion {
     /// The mean of the loops' means, a row for each sample.
-    mean: Vec<Vec<f64>>,
+    pub mean: Vec<Vec<f64>>,
     /// The mean of the loops' variances and the spread of their means; empty without variance units.
-    variance: Vec<Vec<f64>>,
+    pub variance: Vec<Vec<f64>>,
     /// What each loop drew.
-    samples: Vec<Vec<Vec<f64>>>,
+    pub samples: Vec<Vec<Vec<f64>>>,
     /// How the uncertainty of the recognised state enters.
-    uncertainty: &'static str,
+    pub uncertainty: &'static str,
     /// How many states count, averaged over the members: 1 where one explains the observed samples far better than all others.
-    effective_states: f64,
+    pub effective_states: f64,
     /// Nats per step and channel of what really followed, in scaled units.
-    nll: Option<f64>,
+    pub nll: Option<f64>,
     /// Share of what really followed within one standard deviation.
-    within_one: Option<f64>,
+    pub within_one: Option<f64>,
     /// Share within two.
-    within_two: Option<f64>,
+    pub within_two: Option<f64>,
     /// (3.5) of the mean over what really followed.
     #[serde(skip)]
     pub error: f64,
 }
 
 /// Completes each sequence that has a rest; `recognitions` of each member, sequence by sequence.
-pub fn complete(
+pub(super) fn complete(
     trained: &Trained,
     (members, recognitions): (&[Member<'_>], &[Vec<Recognition>]),
     (data, heard): (&Dataset, usize),
@@ -105,11 +107,7 @@ impl Completion {
 
 /// Names and values of what is written: mean, variance and a sample in each of as many rows as there are samples. What was heard has no
 /// variance.
-pub fn fields(
-    data: &Dataset,
-    heard: usize,
-    completions: &[Option<Completion>],
-) -> Result<Vec<(&'static str, Dataset)>> {
+pub(super) fn fields(data: &Dataset, heard: usize, completions: &[Option<&Completion>]) -> Result<Fields> {
     let n = data.channels().len();
     let field = |of: &dyn Fn(&Completion, usize) -> Vec<f64>, known: bool| -> Result<Dataset> {
         let mut sequences = Vec::new();

@@ -1,39 +1,47 @@
-//! `scrnn generate --from`: how recorded sequences go on, as a distribution.
-
-use std::path::Path;
+//! How recorded sequences go on, as a distribution.
 
 use scrnn::dataset::{Dataset, Sequence};
+use scrnn::engine::Engine;
 use scrnn::recognition::{RecognitionOptions, recognize};
-use scrnn_data as files;
-use scrnn_run::completion;
-use scrnn_run::failure::{Failure, Result};
-use scrnn_run::members;
-use scrnn_run::memory::{self, product};
-use scrnn_run::trained::Trained;
 
-use super::{Arguments, Fields};
-use crate::args::Shared;
+use super::{Fields, check_finite};
+use crate::completion;
+use crate::failure::{Failure, Result};
+use crate::members;
+use crate::memory::{self, product};
+use crate::trained::Trained;
 
-/// Mean and variance of what follows the first samples of each sequence of `path`, and as many samples of it as were asked for.
-pub fn fields(arguments: &Arguments, path: &Path, all: &[Trained], shared: &Shared) -> Result<Fields> {
+/// How far to go on, and with what.
+#[derive(Debug, Clone, Copy)]
+pub struct Onward {
+    /// How many samples of each sequence are heard; all of it where it is not said.
+    pub observed: Option<usize>,
+    /// The number of steps after them; to the end of the sequence where it is not said.
+    pub steps: Option<usize>,
+    /// How many closed loops there are.
+    pub samples: usize,
+    /// Of the search for states and of the noise.
+    pub seed: u64,
+}
+
+/// Mean and variance of what follows the first samples of each sequence of `data`, and as many samples of it as were asked for. `data` are in
+/// their own units, on the network's channels; `all` are the members of one mixture.
+///
+/// # Errors
+/// [`Failure::Input`] where nothing is left to predict, and for what does not fit the network.
+pub fn onward(all: &[Trained], data: &Dataset, options: Onward, engine: &Engine) -> Result<Fields> {
     let Some(trained) = all.first() else { return Ok(Vec::new()) };
-    let (checkpoint, engine) = (&trained.checkpoint, shared.engine()?);
-    let data = files::read_all(&[path], &arguments.part.of(path, trained.selection()))?.data;
-    let data = trained.fitted_aloud(data, path, shared)?;
+    let checkpoint = &trained.checkpoint;
     data.check_for(&checkpoint.topology)?;
-    let (n, delay, loops) = (data.channels().len(), checkpoint.topology.delay(), arguments.samples as usize);
-    if let Some(observed) = arguments.observed.filter(|observed| *observed <= delay) {
-        let message = format!("--observed {observed} leaves nothing to predict: the network's delay is {delay}");
-        return Err(Failure::input(message, format!("observe at least {} samples", delay + 1)));
-    }
-    let scaled = checkpoint.scaling.apply(&data)?;
+    let (n, delay, loops) = (data.channels().len(), checkpoint.topology.delay(), options.samples);
+    completion::check_observed(options.observed, delay)?;
+    let scaled = checkpoint.scaling.apply(data)?;
     let networks: Vec<_> = all.iter().map(Trained::network).collect();
     let mixture = members::mixed(all, &networks);
-    shared.say(format_args!("the recognised state's uncertainty: {}", completion::UNCERTAINTY));
     let mut rests = Vec::new();
     for sequence in scaled.sequences() {
-        let heard = arguments.observed.unwrap_or(usize::MAX).min(sequence.len());
-        let ahead = arguments.steps.unwrap_or(sequence.len() - heard);
+        let heard = options.observed.unwrap_or(usize::MAX).min(sequence.len());
+        let ahead = options.steps.unwrap_or(sequence.len() - heard);
         if ahead == 0 {
             let message = format!("sequence {} is heard to its end", sequence.name);
             return Err(Failure::input(message, "say with --steps how many samples to generate after it"));
@@ -45,15 +53,15 @@ pub fn fields(arguments: &Arguments, path: &Path, all: &[Trained], shared: &Shar
         let beginning = Dataset::new(data.channels().to_vec(), vec![sequence.truncated(heard)])?;
         let mut recognised = Vec::new();
         for (one, network) in all.iter().zip(&networks) {
-            let options = RecognitionOptions::with(|it| {
-                it.seed = arguments.seed;
+            let search = RecognitionOptions::with(|it| {
+                it.seed = options.seed;
                 it.initial_state_variance = one.initial_state_variance();
             });
-            recognised.extend(recognize(network, &one.checkpoint.initial_states, &beginning, &options, &engine)?);
+            recognised.extend(recognize(network, &one.checkpoint.initial_states, &beginning, &search, engine)?);
         }
         let recognised: Vec<_> = recognised.iter().collect();
         let part = (sequence.values(), heard, ahead);
-        rests.push(completion::forecast(&mixture, &recognised, part, (loops, arguments.seed), &engine)?);
+        rests.push(completion::forecast(&mixture, &recognised, part, (loops, options.seed), engine)?);
     }
 
     let scaling = &checkpoint.scaling;
@@ -66,7 +74,7 @@ pub fn fields(arguments: &Arguments, path: &Path, all: &[Trained], shared: &Shar
             for k in 0..loops {
                 let name = if loops > 1 { format!("{}/{}", sequence.name, k + 1) } else { sequence.name.clone() };
                 let values = of(s, k);
-                super::check_finite(&name, &values, n)?;
+                check_finite(&name, &values, n)?;
                 sequences.push(Sequence::new(name, n, values)?);
             }
         }

@@ -1,12 +1,12 @@
 //! Where following begins, and whether the network has found what it follows.
 
+use scrnn::dataset::{Dataset, Sequence};
 use scrnn::engine::Engine;
 use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions};
-use scrnn_run::assessment::{Predictions, open_loop};
-use scrnn_run::failure::Result;
-use scrnn_run::trained::Trained;
 
-use scrnn::dataset::{Dataset, Sequence};
+use crate::assessment::{Predictions, open_loop};
+use crate::failure::Result;
+use crate::trained::Trained;
 
 /// Samples that are predicted before the learned states are compared.
 const WAIT: usize = 5;

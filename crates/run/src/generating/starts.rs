@@ -6,12 +6,26 @@ use scrnn::checkpoint::Checkpoint;
 use scrnn::dataset::Dataset;
 use scrnn::topology::Group;
 
-use super::Arguments;
-use crate::args::Shared;
 use scrnn_data as files;
-use scrnn_run::failure::{Failure, Result};
-use scrnn_run::memory::{self, product};
-use scrnn_run::trained::Trained;
+
+use super::Generating;
+use crate::failure::{Failure, Result};
+use crate::memory::{self, product};
+use crate::trained::Trained;
+
+/// Where generation starts.
+#[derive(Debug, Clone, Default)]
+pub enum From {
+    /// From the initial state of each learned sequence.
+    #[default]
+    Learned,
+    /// From that of the learned sequence of this name or, counted from 1, number.
+    Sequence(String),
+    /// From the mean of the learned initial states.
+    Mean,
+    /// From each of these.
+    Given(Vec<State>),
+}
 
 /// One sequence to generate.
 #[derive(Debug, Clone)]
@@ -27,28 +41,28 @@ pub struct Row {
 }
 
 /// An initial state without its samples.
-struct State {
+#[derive(Debug, Clone)]
+pub struct State {
     name: String,
     values: Vec<f64>,
     /// The learned sequence that it belongs to, from 0.
     learned: Option<usize>,
 }
 
+impl State {
+    /// A value of u_0 for each context unit, under a name.
+    pub fn new(name: impl Into<String>, values: Vec<f64>) -> Self {
+        Self { name: name.into(), values, learned: None }
+    }
+}
+
 /// The sequences to generate. `sensing` says whether recorded samples are needed beyond the first; where simulated robots
 /// make them, so many threads are used.
-pub fn rows(
-    (arguments, trained): (&Arguments, &Trained),
-    (shared, threads): (&Shared, usize),
-    sensing: bool,
-) -> Result<Vec<Row>> {
+pub(super) fn rows(options: &Generating, trained: &Trained, threads: usize, sensing: bool) -> Result<Vec<Row>> {
     let checkpoint = &trained.checkpoint;
-    let states = states(arguments, trained)?;
-    let mut rows = match (&arguments.data, sensing) {
-        (Some(path), _) => {
-            let data = files::read_all(&[path], &arguments.part.of(path, trained.selection()))?.data;
-            let data = trained.fitted_aloud(data, path, shared)?;
-            pair(states, &data, checkpoint)?
-        }
+    let states = states(&options.from, trained)?;
+    let mut rows = match (&options.data, sensing) {
+        (Some(data), _) => pair(states, data, checkpoint)?,
         (None, true) => {
             let data = trained.learned_data(threads)?;
             if states.iter().all(|state| state.learned.is_some()) {
@@ -63,7 +77,7 @@ pub fn rows(
         }
         (None, false) => on_their_own(states, trained),
     };
-    if let Some(steps) = arguments.steps {
+    if let Some(steps) = options.steps {
         rows.iter_mut().for_each(|row| row.steps = steps);
     }
     if let Some(row) = rows.iter().find(|row| row.steps == 0) {
@@ -72,12 +86,12 @@ pub fn rows(
     }
     let wide = 3 * checkpoint.channels.len() + checkpoint.topology.context_units();
     let longest = rows.iter().map(|row| row.steps).max().unwrap_or(0);
-    let bytes = product(&[rows.len(), arguments.samples as usize, longest, wide, size_of::<f64>()]);
+    let bytes = product(&[rows.len(), options.samples, longest, wide, size_of::<f64>()]);
     memory::check("what is to be generated", bytes)?;
-    if arguments.samples > 1 {
+    if options.samples > 1 {
         let repeat = |row: &Row| {
             let row = row.clone();
-            (1..=arguments.samples).map(move |k| Row { name: format!("{}/{k}", row.name), ..row.clone() })
+            (1..=options.samples).map(move |k| Row { name: format!("{}/{k}", row.name), ..row.clone() })
         };
         rows = rows.iter().flat_map(repeat).collect();
     }
@@ -85,7 +99,7 @@ pub fn rows(
 }
 
 /// The initial states that the options ask for.
-fn states(arguments: &Arguments, trained: &Trained) -> Result<Vec<State>> {
+fn states(from: &From, trained: &Trained) -> Result<Vec<State>> {
     let checkpoint = &trained.checkpoint;
     let learned = &checkpoint.initial_states;
     let of_sequence = |s: usize| State {
@@ -93,20 +107,31 @@ fn states(arguments: &Arguments, trained: &Trained) -> Result<Vec<State>> {
         values: learned.sequence(s).to_vec(),
         learned: Some(s),
     };
-    if let Some(path) = &arguments.initial_state {
-        return given(path, checkpoint);
-    }
-    if arguments.mean {
-        return Ok(vec![State { name: "mean".to_owned(), values: learned.mean().to_vec(), learned: None }]);
-    }
-    match &arguments.sequence {
-        Some(wanted) => Ok(vec![of_sequence(trained.sequence(wanted)?)]),
-        None => Ok((0..checkpoint.sequences.len()).map(of_sequence).collect()),
+    match from {
+        From::Learned => Ok((0..checkpoint.sequences.len()).map(of_sequence).collect()),
+        From::Sequence(wanted) => Ok(vec![of_sequence(trained.sequence(wanted)?)]),
+        From::Mean => Ok(vec![State::new("mean", learned.mean().to_vec())]),
+        From::Given(states) => {
+            let needed = checkpoint.topology.context_units();
+            match states.iter().find(|state| state.values.len() != needed) {
+                Some(State { name, values, .. }) => {
+                    let message = format!(
+                        "initial state {name} has {} values, but the network has {needed} context units",
+                        values.len()
+                    );
+                    Err(Failure::input(message, "give one for each context unit"))
+                }
+                None => Ok(states.clone()),
+            }
+        }
     }
 }
 
 /// The initial states in a file: every row of every sequence in it is one.
-fn given(path: &Path, checkpoint: &Checkpoint) -> Result<Vec<State>> {
+///
+/// # Errors
+/// [`Failure`] for a file that cannot be read, and for another number of columns than the network has context units.
+pub fn given_states(path: &Path, checkpoint: &Checkpoint) -> Result<Vec<State>> {
     // A single state is an array of one row: its axes are no matter of doubt.
     let is_array = path.extension().is_some_and(|extension| extension == "npy" || extension == "npz");
     let axes = is_array.then_some(files::Axes { sequences: None, steps: 0, channels: Some(1) });
@@ -120,7 +145,7 @@ fn given(path: &Path, checkpoint: &Checkpoint) -> Result<Vec<State>> {
     for sequence in file.sequences() {
         for k in 0..sequence.len() {
             let name = if sequence.len() == 1 { sequence.name.clone() } else { format!("{}/{}", sequence.name, k + 1) };
-            states.push(State { name, values: sequence.sample(k).to_vec(), learned: None });
+            states.push(State::new(name, sequence.sample(k).to_vec()));
         }
     }
     Ok(states)
@@ -136,7 +161,7 @@ fn pair(states: Vec<State>, data: &Dataset, checkpoint: &Checkpoint) -> Result<V
             let only = &states[0];
             let copy = |s: usize| {
                 let name = data.sequences()[s].name.clone();
-                row(State { name, values: only.values.clone(), learned: None }, data, s, checkpoint)
+                row(State::new(name, only.values.clone()), data, s, checkpoint)
             };
             (0..m).map(copy).collect()
         }

@@ -1,15 +1,15 @@
 //! What is said of learned sequences where they share one initial state: by what the network heard, not by where it began.
 
-use scrnn::dataset::Dataset;
-use scrnn_run::failure::Result;
-use scrnn_run::likeness;
-use scrnn_run::trained::Trained;
-
 use super::{Found, Learned};
-use crate::args::Shared;
+use crate::failure::Result;
+use crate::likeness;
+use crate::messages::Messages;
+use crate::trained::Trained;
+use scrnn::dataset::Dataset;
+use scrnn::engine::Engine;
 
 /// Whether all learned sequences of a run share one initial state.
-pub fn share_one_state(trained: &Trained) -> bool {
+pub(super) fn share_one_state(trained: &Trained) -> bool {
     trained.initial_state_variance() == 0.0
 }
 
@@ -17,12 +17,17 @@ pub fn share_one_state(trained: &Trained) -> bool {
 ///
 /// # Errors
 /// What the network cannot run on.
-pub fn rank(trained: &Trained, new: &Dataset, heard: usize, found: &mut [Found], shared: &Shared) -> Result<()> {
-    let engine = shared.engine()?;
+pub(super) fn rank(
+    trained: &Trained,
+    new: &Dataset,
+    heard: usize,
+    found: &mut [Found],
+    (engine, messages): (&Engine, &dyn Messages),
+) -> Result<()> {
     let learned = match trained.learned_data(engine.threads()) {
         Ok(learned) => learned,
         Err(failure) => {
-            shared.say(format!(
+            messages.say(&format!(
                 "note: which learned sequences these are like is not told: all share one initial state, and what was learned cannot be \
                  read again ({failure})"
             ));
@@ -30,7 +35,7 @@ pub fn rank(trained: &Trained, new: &Dataset, heard: usize, found: &mut [Found],
             return Ok(());
         }
     };
-    for (found, ranking) in found.iter_mut().zip(likeness::rank(trained, &learned, new, heard, &engine)?) {
+    for (found, ranking) in found.iter_mut().zip(likeness::rank(trained, &learned, new, heard, engine)?) {
         let one = |like: &likeness::Likeness| Learned {
             number: like.sequence + 1,
             sequence: trained.checkpoint.sequences[like.sequence].clone(),
