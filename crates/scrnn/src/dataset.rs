@@ -17,7 +17,8 @@ pub struct Sequence {
     /// A name to show; may be empty.
     pub name: String,
     channels: usize,
-    values: Arc<[f64]>,
+    /// Shared by clones, and never copied: recordings fill much of the memory.
+    values: Arc<Vec<f64>>,
     /// How many values are missing.
     missing: usize,
 }
@@ -44,12 +45,14 @@ impl Sequence {
             let needed = values.len().next_multiple_of(channels.max(1));
             return Err(Error::Length { what: format!("sequence `{name}`"), found: values.len(), needed });
         }
-        Ok(Self::of(name, channels, values.into()))
+        Ok(Self::of(name, channels, values))
     }
 
-    fn of(name: String, channels: usize, values: Arc<[f64]>) -> Self {
+    fn of(name: String, channels: usize, mut values: Vec<f64>) -> Self {
+        // Readers push what comes: up to half of the room would stay empty for as long as the sequence lives.
+        values.shrink_to_fit();
         let missing = values.iter().filter(|value| value.is_nan()).count();
-        Self { name, channels, values, missing }
+        Self { name, channels, values: Arc::new(values), missing }
     }
 
     /// How many values are missing.
@@ -97,7 +100,7 @@ impl Sequence {
     #[must_use]
     pub fn truncated(&self, samples: usize) -> Self {
         let end = samples.min(self.len()) * self.channels;
-        Self::of(self.name.clone(), self.channels, self.values[..end].into())
+        Self::of(self.name.clone(), self.channels, self.values[..end].to_vec())
     }
 }
 
