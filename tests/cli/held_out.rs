@@ -179,3 +179,28 @@ fn what_cannot_be_held_out_is_refused_with_what_can() {
     let (_, text) = place.fails(5, "train arcs.toml --out run --epochs 3 --resume --set data.held_out=0.5");
     assert!(text.contains("data.held_out: 0.25 -> 0.5"), "{text}");
 }
+
+#[test]
+fn the_recipe_does_not_look_at_what_is_held_out() {
+    let chosen = |odd: &dyn Fn(u32) -> f64| {
+        let mut text = arcs();
+        for k in 0..40 {
+            writeln!(text, "odd,{},{}", odd(k), -odd(k)).unwrap();
+        }
+        let place = Place::new();
+        place.write("arcs.csv", text);
+        place.ok("train arcs.csv --out run --set data.held_out=[\"odd\"] --epochs 1 --quiet");
+        // The folder is another one each time.
+        place
+            .text("run/experiment.toml")
+            .lines()
+            .filter(|line| !line.starts_with("files"))
+            .collect::<Vec<_>>()
+            .join("\n")
+    };
+    let spikes = |k: u32| if k.is_multiple_of(13) { 90.0 } else { f64::from(k * k % 7) };
+    let still = |_: u32| 0.0;
+    let text = chosen(&spikes);
+    assert!(text.contains("held_out = [\"odd\"]"), "{text}");
+    assert_eq!(text, chosen(&still));
+}

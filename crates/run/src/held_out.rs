@@ -30,23 +30,36 @@ const ALONE: usize = 20;
 
 /// Takes the sequences out that the experiment does not want learned.
 pub(crate) fn split(mut source: Source, experiment: &Experiment) -> Result<Source> {
-    let Some(wanted) = &experiment.data.held_out else { return Ok(source) };
-    let held = match wanted {
-        HeldOut::Share(share) => drawn(&source.data, *share, experiment.seed)?,
-        HeldOut::Drawn(HeldOutDrawn { share, seed }) => drawn(&source.data, *share, *seed)?,
-        HeldOut::Names(names) => named(&source.data, names)?,
-        HeldOut::Files(HeldOutFiles { files }) => {
-            let held_out = read_all(files, &experiment.data.selection())?.data;
-            source.held_out = Some(channels::matched(held_out, source.data.channels(), "held_out")?);
-            return Ok(source);
-        }
-    };
+    if let Some(HeldOut::Files(HeldOutFiles { files })) = &experiment.data.held_out {
+        let held_out = read_all(files, &experiment.data.selection())?.data;
+        source.held_out = Some(channels::matched(held_out, source.data.channels(), "held_out")?);
+        return Ok(source);
+    }
+    let Some(held) = held(&source.data, experiment)? else { return Ok(source) };
     if let Some(truth) = &mut source.truth {
         truth.variances = part(&truth.variances, &held, false)?;
     }
     source.held_out = Some(part(&source.data, &held, true)?);
     source.data = part(&source.data, &held, false)?;
     Ok(source)
+}
+
+/// What the experiment wants learned of `data`.
+pub(crate) fn learned(data: &Dataset, experiment: &Experiment) -> Result<Dataset> {
+    match held(data, experiment)? {
+        Some(held) => part(data, &held, false),
+        None => Ok(data.clone()),
+    }
+}
+
+/// Whether each sequence is held out; none where the experiment holds out none of these.
+fn held(data: &Dataset, experiment: &Experiment) -> Result<Option<Vec<bool>>> {
+    match &experiment.data.held_out {
+        Some(HeldOut::Share(share)) => drawn(data, *share, experiment.seed).map(Some),
+        Some(HeldOut::Drawn(HeldOutDrawn { share, seed })) => drawn(data, *share, *seed).map(Some),
+        Some(HeldOut::Names(names)) => named(data, names).map(Some),
+        Some(HeldOut::Files(_)) | None => Ok(None),
+    }
 }
 
 /// Whether each sequence is held out: a share of them, at least one, and never all.

@@ -6,6 +6,7 @@ use scrnn_data::format::Format;
 
 use crate::experiment::{self, Comment, Data, Experiment, Override, ScalingChoice};
 use crate::failure::{Failure, Result};
+use crate::held_out;
 use crate::members;
 use crate::recipe::{self, Recipe};
 use crate::run_folder::{CHECKPOINT, EXPERIMENT};
@@ -177,15 +178,18 @@ fn alone(files: &[PathBuf], overrides: &[Override], out: Option<&Path>, resume: 
     Ok(Asked::of(experiment, Some(source), out))
 }
 
-/// The options that say how data are read: that is known before they are; what suits them, after.
+/// The options that say which data are learned and how they are read: that is known before they are; what suits them, after.
 fn of_data(overrides: &[Override]) -> Vec<Override> {
-    overrides.iter().filter(|change| change.path.first().is_some_and(|part| part == "data")).cloned().collect()
+    let says = |change: &&Override| change.path.first().is_some_and(|part| part == "data" || part == "seed");
+    overrides.iter().filter(says).cloned().collect()
 }
 
-/// Reads the data of an experiment that says no more than that, and puts in what the recipe chooses for them, with its reasons.
+/// Reads the data of an experiment that says no more than that, and puts in what the recipe chooses for them, with its reasons. It chooses
+/// by what is learned; what is held out has no say.
 fn choose(first: Experiment, folder: &Path) -> Result<(Experiment, Source, Vec<Comment>)> {
     let mut source = source::load(&first.clone().resolved(folder)?.data, 1)?;
-    let Recipe { scaling, rest, network, training, reasons } = recipe::choose(&source.data);
+    let Recipe { scaling, rest, network, training, reasons } =
+        recipe::choose(&held_out::learned(&source.data, &first)?);
     if let (None, Some(rest)) = (first.data.rest, rest) {
         source.data = source::at_rest(&source.data, rest)?;
     }

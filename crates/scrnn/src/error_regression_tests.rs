@@ -362,19 +362,19 @@ fn with_features(delay: usize, variance: bool) -> Vec<Network> {
 fn values_that_are_missing_or_masked_are_not_counted() {
     let network = network(1, true, fast_and_slow());
     for (mask, last) in [([1.0; 3], 3), ([0.0, 1.0, 0.5], 2), ([0.0; 3], 0)] {
-        let options = ErrorRegressionOptions {
-            window: 6,
-            iterations: 1,
-            mask: mask.to_vec(),
-            ..ErrorRegressionOptions::new(3)
-        };
+        let options =
+            ErrorRegressionOptions { window: 6, iterations: 1, mask: mask.to_vec(), ..ErrorRegressionOptions::new(3) };
         let mut regression = ErrorRegression::new(&network, &u0(&network), options, &Engine::serial()).unwrap();
         let counts = |t: usize| gapped(t).iter().zip(mask).filter(|(x, share)| !x.is_nan() && *share > 0.0).count();
         for t in 0..20 {
             let done = regression.observe(&gapped(t), &mut || true).unwrap();
             // The first sample is an input alone.
             let window = t.saturating_sub(5).max(1)..t + 1;
-            assert_eq!((done.steps, done.values), (window.len(), window.map(counts).sum()), "sample {t}, mask {mask:?}");
+            assert_eq!(
+                (done.steps, done.values),
+                (window.len(), window.map(counts).sum()),
+                "sample {t}, mask {mask:?}"
+            );
         }
         assert_eq!(counts(1), last);
     }
