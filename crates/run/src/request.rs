@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use scrnn::dataset::Dataset;
 use scrnn_data::format::Format;
 
 use crate::experiment::{self, Comment, Data, Experiment, Override, ScalingChoice};
@@ -84,7 +85,10 @@ impl Request {
         match self {
             Self::Experiment(file) => {
                 if let Some(begun) = asks_for_recipe(file) {
-                    return by_recipe((file, begun), overrides, out);
+                    let name = file.display().to_string();
+                    let folder = file.parent().unwrap_or(Path::new(""));
+                    let (experiment, source) = by_recipe(&name, begun, (folder, None), overrides)?;
+                    return Ok(Asked::of(experiment, Some(source), out));
                 }
                 let experiment = experiment::read(file, overrides)?;
                 let experiment = experiment.resolved(file.parent().unwrap_or(Path::new("")))?;
@@ -110,6 +114,28 @@ impl Asked {
     fn of(experiment: Experiment, source: Option<Source>, out: Option<&Path>) -> Self {
         let folder = out.map_or_else(|| Path::new("runs").join(&experiment.name), Path::to_owned);
         Self { experiment, source, folder }
+    }
+}
+
+/// The experiment in `text`, which has the form of an experiment file and is called `name`. Paths in it start from `folder`. Where the
+/// sequences of its files are at hand, they are taken for what those hold.
+///
+/// # Errors
+/// What is wrong with experiment or data.
+pub fn of_text(name: &str, text: &str, folder: &Path, at_hand: Option<Dataset>) -> Result<(Experiment, Source)> {
+    if let Some(begun) = recipe_asked_in(text) {
+        return by_recipe(name, begun, (folder, at_hand), &[]);
+    }
+    let experiment = experiment::read_text(name, text, &[])?.resolved(folder)?;
+    let source = source_of(&experiment.data, at_hand)?;
+    Ok((experiment, source))
+}
+
+/// What is at hand, or what the files hold.
+fn source_of(data: &Data, at_hand: Option<Dataset>) -> Result<Source> {
+    match at_hand {
+        Some(sequences) => source::at_hand(sequences, data.rest),
+        None => source::load(data, 1),
     }
 }
 
@@ -165,7 +191,7 @@ fn alone(files: &[PathBuf], overrides: &[Override], out: Option<&Path>, resume: 
     let files = Data { files: Some(files.to_vec()), ..Data::default() };
     let first = Experiment { name, data: files, ..recipe::bare() };
     let first = experiment::read_text("the experiment", &first.to_file(), &of_data(overrides))?;
-    let (chosen, source, reasons) = choose(first, Path::new(""))?;
+    let (chosen, source, reasons) = choose(first, (Path::new(""), None))?;
     let mut experiment =
         experiment::read_text("the experiment", &chosen.to_file(), overrides)?.resolved(Path::new(""))?;
     let given = |key: &str| overrides.iter().any(|change| plain(&change.path) == key);
@@ -184,10 +210,13 @@ fn of_data(overrides: &[Override]) -> Vec<Override> {
     overrides.iter().filter(says).cloned().collect()
 }
 
+/// Where the data of an experiment are: in files, whose paths start from this folder, or at hand.
+type Place<'a> = (&'a Path, Option<Dataset>);
+
 /// Reads the data of an experiment that says no more than that, and puts in what the recipe chooses for them, with its reasons. It chooses
 /// by what is learned; what is held out has no say.
-fn choose(first: Experiment, folder: &Path) -> Result<(Experiment, Source, Vec<Comment>)> {
-    let mut source = source::load(&first.clone().resolved(folder)?.data, 1)?;
+fn choose(first: Experiment, (folder, at_hand): Place<'_>) -> Result<(Experiment, Source, Vec<Comment>)> {
+    let mut source = source_of(&first.clone().resolved(folder)?.data, at_hand)?;
     let Recipe { scaling, rest, network, training, reasons } =
         recipe::choose(&held_out::learned(&source.data, &first)?);
     if let (None, Some(rest)) = (first.data.rest, rest) {
@@ -215,15 +244,23 @@ fn plain(path: &[String]) -> String {
 fn asks_for_recipe(file: &Path) -> Option<toml::Table> {
     // What is no file has no end, perhaps.
     let text = if file.is_file() { std::fs::read_to_string(file).ok()? } else { return None };
-    let table: toml::Table = toml::from_str(&text).ok()?;
+    recipe_asked_in(&text)
+}
+
+/// The same, of the text of such a file.
+fn recipe_asked_in(text: &str) -> Option<toml::Table> {
+    let table: toml::Table = toml::from_str(text).ok()?;
     let recipe = table.get("training")?.get("recipe")?.as_str()?;
     (recipe == "auto").then_some(table)
 }
 
 /// The experiment of a file that leaves settings to the recipe: those that the file has, and the chosen ones for all else.
-fn by_recipe((file, given): (&Path, toml::Table), overrides: &[Override], out: Option<&Path>) -> Result<Asked> {
-    let name = file.display().to_string();
-    let folder = file.parent().unwrap_or(Path::new(""));
+fn by_recipe(
+    name: &str,
+    given: toml::Table,
+    (folder, at_hand): Place<'_>,
+    overrides: &[Override],
+) -> Result<(Experiment, Source)> {
     // The data first, with all else as it may be: what is wrong with them is said in their place.
     let mut first = toml::Table::try_from(recipe::bare()).expect("an experiment is a table");
     for key in ["name", "seed", "data"] {
@@ -232,12 +269,12 @@ fn by_recipe((file, given): (&Path, toml::Table), overrides: &[Override], out: O
         }
     }
     let text = |table: &toml::Table| toml::to_string(table).expect("a table that was read can be written");
-    let first = experiment::read_text(&name, &text(&first), &of_data(overrides))?;
+    let first = experiment::read_text(name, &text(&first), &of_data(overrides))?;
     if first.data.task.is_some() {
         let message = "`training.recipe` chooses settings for data from files, and these are a task of the thesis";
         return Err(Failure::input(message, "leave recipe out: assets/experiments has settings for the tasks"));
     }
-    let (chosen, source, reasons) = choose(first, folder)?;
+    let (chosen, source, reasons) = choose(first, (folder, at_hand))?;
     let mut whole = toml::Table::try_from(&chosen).expect("an experiment is a table");
     let mut own = given;
     if let Some(training) = own.get_mut("training").and_then(toml::Value::as_table_mut) {
@@ -250,9 +287,9 @@ fn by_recipe((file, given): (&Path, toml::Table), overrides: &[Override], out: O
     };
     let reasons: Vec<Comment> = reasons.into_iter().filter(|reason| !has(&reason.key)).collect();
     lay_over(&mut whole, own);
-    let mut experiment = experiment::read_text(&name, &text(&whole), overrides)?.resolved(folder)?;
+    let mut experiment = experiment::read_text(name, &text(&whole), overrides)?.resolved(folder)?;
     experiment.comments = reasons;
-    Ok(Asked::of(experiment, Some(source), out))
+    Ok((experiment, source))
 }
 
 /// Puts `upper` over `lower`, table by table; all else, lists of groups among it, is replaced.

@@ -76,15 +76,33 @@ pub fn load(data: &Data, threads: usize) -> Result<Source> {
     if files.is_empty() {
         return Err(Failure::input("the experiment names no file", "add one to `data.files`"));
     }
-    let rest = data.rest;
-    let Reading { data, period, mut remarks, .. } = read_all(files, &data.selection())?;
+    let Reading { data: read, period, mut remarks, .. } = read_all(files, &data.selection())?;
+    let source = at_hand(read, data.rest)?;
+    remarks.extend(source.remarks);
+    Ok(Source { period, remarks, ..Source::of(source.data) })
+}
+
+/// Sequences that are at hand, as if they had been read from files: with what looks wrong among them, and held at rest for this share of
+/// their lengths.
+///
+/// # Errors
+/// None where the sequences are sound.
+pub fn at_hand(data: Dataset, rest: Option<f64>) -> Result<Source> {
     let suspicions = suspicions::look(&data).into_iter();
+    let remarks = suspicions.map(|suspicion| Remark::Suspicion { suspicion }).collect();
     let data = match rest {
         Some(rest) if rest > 0.0 => at_rest(&data, rest)?,
         _ => data,
     };
-    remarks.extend(suspicions.map(|suspicion| Remark::Suspicion { suspicion }));
-    Ok(Source { period, remarks, ..Source::of(data) })
+    Ok(Source { remarks, ..Source::of(data) })
+}
+
+/// As [`of`], from what the files of the experiment hold, which is at hand.
+///
+/// # Errors
+/// As [`of`].
+pub fn of_hand(experiment: &Experiment, data: Dataset) -> Result<Source> {
+    held_out::split(at_hand(data, experiment.data.rest)?, experiment)
 }
 
 /// Holds the last sample of each sequence for a share of its length.

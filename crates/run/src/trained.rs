@@ -59,12 +59,20 @@ impl Trained {
             path.to_owned()
         };
         let checkpoint = read_checkpoint(&file)?;
+        Self::of(file, checkpoint)
+    }
+
+    /// A checkpoint that is at hand, as if it had been read from `path`.
+    ///
+    /// # Errors
+    /// [`Failure::Input`] for parts that do not fit each other.
+    pub fn of(path: PathBuf, checkpoint: Checkpoint) -> Result<Self> {
         let notes = Notes::of(&checkpoint);
         let mut network = Network::new(checkpoint.topology.clone(), checkpoint.parameters.clone())?;
         if let Some(factor) = notes.as_ref().and_then(|notes| notes.variance_factor.as_ref()) {
             factor.apply(&mut network)?;
         }
-        Ok(Self { path: file, checkpoint, notes, network })
+        Ok(Self { path, checkpoint, notes, network })
     }
 
     /// What is to be said of its variances, if they are not as they were learned.
