@@ -342,6 +342,26 @@ fn one_file_makes_generators_of_random_numbers() {
     assert_eq!(files, ["crates/scrnn/src/streams.rs"]);
 }
 
+/// Only the crate whose lint table lets the macros of pyo3 write `unsafe` needs to be looked at: all others forbid it.
+#[test]
+fn nobody_writes_unsafe_where_only_macros_may() {
+    let mut manifests = Vec::new();
+    collect("crates", "Cargo.toml", &mut manifests);
+    let free: Vec<&str> = manifests
+        .iter()
+        .filter(|one| !one.text.contains("[lints]\nworkspace = true"))
+        .map(|one| one.path.as_str())
+        .collect();
+    assert_eq!(free, ["crates/python/Cargo.toml"], "crates with a lint table of their own");
+    let mut problems = Vec::new();
+    for source in sources().iter().filter(|source| source.path.starts_with("crates/python/")) {
+        for (line, code, _) in source.lines().filter(|(_, code, _)| code.contains("unsafe")) {
+            problems.push(format!("{}:{line}: {code}", source.path));
+        }
+    }
+    report(&problems);
+}
+
 #[test]
 fn nothing_is_left_undone() {
     let mut problems = Vec::new();

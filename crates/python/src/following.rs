@@ -1,0 +1,206 @@
+//! Error regression while samples arrive.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
+use pyo3::prelude::*;
+use scrnn::error_regression::{Ascent, ErrorRegressionOptions};
+use scrnn_run::failure::Failure;
+use scrnn_run::following::{Begin, Deadline, Following};
+use scrnn_run::trained::Trained;
+
+use crate::arrays::rows;
+use crate::failure::compute;
+use crate::machine::engine;
+use crate::model::Model;
+
+/// The momentum ascent's rate for one channel, that of the thesis' chapter 5.
+const THESIS_RATE: f64 = 1e-4;
+
+/// What became of one sample, in the data's units.
+#[pyclass(frozen, get_all, module = "scrnn._scrnn")]
+pub struct Step {
+    /// Its number, from 1.
+    sample: usize,
+    /// The next sample's mean, (C,); None before the network's delay is over.
+    mean: Option<Py<PyArray1<f64>>>,
+    /// The next sample's variance, (C,); None without variance units.
+    variance: Option<Py<PyArray1<f64>>>,
+    /// Means of the samples after the next one, (ahead, C).
+    forecast: Py<PyArray2<f64>>,
+    /// Their variances; None without variance units.
+    forecast_variance: Option<Py<PyArray2<f64>>>,
+    /// What the window now says about its samples, (window, C).
+    smoothed: Py<PyArray2<f64>>,
+    /// The contexts that go with them, (window, units).
+    contexts: Py<PyArray2<f64>>,
+    /// Nats per observed value of the window, before and after.
+    log_likelihood: Option<(f64, f64)>,
+    /// Half the mean squared error over the window, before and after, in scaled units.
+    error: Option<(f64, f64)>,
+    /// Whether the window is as likely as what was learned, but for one nat per step and channel.
+    locked: Option<bool>,
+    /// Updates that were made.
+    iterations: usize,
+    /// How long it took.
+    milliseconds: f64,
+    /// Channels that had no value.
+    missing: Vec<String>,
+}
+
+/// A network that follows samples.
+#[pyclass(frozen, module = "scrnn._scrnn")]
+pub struct Follower {
+    following: Mutex<Following>,
+    channels: Vec<String>,
+    units: usize,
+}
+
+#[pymethods]
+impl Follower {
+    #[new]
+    #[pyo3(signature = (model, *, window=50, iterations=10, ahead=10, optimiser=None, rate=None, momentum=None, max_norm=None,
+        deadline=None, closed_channels=vec![], masked_channels=vec![], begin=None, sequence=None, instruction_set=None))]
+    #[expect(clippy::too_many_arguments, reason = "they come by name, from one place in the Python layer")]
+    fn new(
+        py: Python<'_>,
+        model: &Model,
+        window: usize,
+        iterations: usize,
+        ahead: usize,
+        optimiser: Option<&str>,
+        rate: Option<f64>,
+        momentum: Option<f64>,
+        max_norm: Option<f64>,
+        deadline: Option<f64>,
+        closed_channels: Vec<String>,
+        masked_channels: Vec<String>,
+        begin: Option<&str>,
+        sequence: Option<String>,
+        instruction_set: Option<&str>,
+    ) -> PyResult<Self> {
+        compute(py, || {
+            let only = model.only()?;
+            let channels = only.checkpoint.channels.clone();
+            let mut options = ErrorRegressionOptions::new(channels.len());
+            (options.window, options.iterations, options.ahead) = (window, iterations, ahead);
+            match (optimiser, momentum) {
+                (Some("adam"), Some(_)) => {
+                    return Err(Failure::input(
+                        "momentum does not go with optimiser=\"adam\"",
+                        "leave one of them out",
+                    ));
+                }
+                (Some("momentum"), _) | (None, Some(_)) => {
+                    let momentum = momentum.unwrap_or(0.9);
+                    options.ascent = Ascent::Momentum { rate: THESIS_RATE / channels.len() as f64, momentum };
+                }
+                (Some("adam"), None) | (None, None) => {}
+                (Some(other), _) => {
+                    let message = format!("there is no optimiser {other:?}");
+                    return Err(Failure::input(message, "give \"adam\" or \"momentum\""));
+                }
+            }
+            if let Some(rate) = rate {
+                options.ascent = options.ascent.with_rate(rate);
+            }
+            options.max_norm = max_norm.filter(|norm| *norm != 0.0);
+            for (names, shares) in [(&closed_channels, &mut options.sensed), (&masked_channels, &mut options.mask)] {
+                for name in names {
+                    let place = channels.iter().position(|channel| channel == name).ok_or_else(|| {
+                        let help = format!("the channels are {}", channels.join(", "));
+                        Failure::input(format!("the network has no channel `{name}`"), help)
+                    })?;
+                    shares[place] = 0.0;
+                }
+            }
+            let begin = match (begin, sequence) {
+                (_, Some(wanted)) => Begin::Sequence(wanted),
+                (Some("mean"), None) => Begin::Mean,
+                _ => Begin::Likely,
+            };
+            let limit = match deadline {
+                None => None,
+                Some(ms) => match Duration::try_from_secs_f64(ms / 1e3) {
+                    Ok(limit) if ms > 0.0 => Some(limit),
+                    _ => return Err(Failure::input(format!("deadline is {ms}"), "give milliseconds, more than 0")),
+                },
+            };
+            let trained = Arc::new(Trained::of(only.path.clone(), only.checkpoint.clone())?);
+            let units = trained.checkpoint.topology.context_units();
+            let engine = engine(1, instruction_set)?;
+            let following = Following::new(trained, options, begin, Deadline::new(limit), engine)?;
+            Ok(Self { following: Mutex::new(following), channels, units })
+        })
+    }
+
+    /// Takes one sample of float64.
+    fn observe(&self, py: Python<'_>, sample: PyReadonlyArray1<'_, f64>) -> PyResult<Step> {
+        let own;
+        let values: &[f64] = match sample.as_slice() {
+            Ok(values) => values,
+            Err(_) => {
+                own = sample.as_array().to_vec();
+                &own
+            }
+        };
+        let (told, view, missing) = compute(py, || {
+            let mut following = self.following.lock().unwrap_or_else(PoisonError::into_inner);
+            let done = following.observe(values)?;
+            let missing: Vec<String> = following.missing().iter().map(|&c| self.channels[c].clone()).collect();
+            Ok((following.told(&done, false), following.view(), missing))
+        })?;
+        let n = self.channels.len();
+        let first = |rows: &[Vec<f64>]| rows.first().map(|row| PyArray1::from_slice(py, row).unbind());
+        let rest = |all: &[Vec<f64>]| rows(py, all.get(1..).unwrap_or_default(), n).map(Bound::unbind);
+        let pair = |pair: Option<[f64; 2]>| pair.map(|[before, after]| (before, after));
+        let has_variance = !view.variance.is_empty();
+        Ok(Step {
+            sample: told.sample,
+            mean: first(&view.predicted),
+            variance: first(&view.variance),
+            forecast: rest(&view.predicted)?,
+            forecast_variance: has_variance.then(|| rest(&view.variance)).transpose()?,
+            smoothed: rows(py, &view.smoothed, n)?.unbind(),
+            contexts: rows(py, &view.contexts, self.units)?.unbind(),
+            log_likelihood: pair(told.ln_likelihood),
+            error: pair(told.error),
+            locked: told.locked,
+            iterations: told.iterations,
+            milliseconds: told.milliseconds,
+            missing,
+        })
+    }
+
+    /// Samples so far.
+    #[getter]
+    fn taken(&self) -> usize {
+        self.following.lock().unwrap_or_else(PoisonError::into_inner).taken()
+    }
+
+    #[getter]
+    fn channels(&self) -> Vec<String> {
+        self.channels.clone()
+    }
+
+    /// Median, 99th percentile, shortest and longest in milliseconds, and how many samples missed the deadline.
+    #[getter]
+    fn latency(&self) -> Option<(f64, f64, f64, f64, Option<usize>)> {
+        let latency = self.following.lock().unwrap_or_else(PoisonError::into_inner).latency()?;
+        Some((latency.median, latency.p99, latency.shortest, latency.longest, latency.missed))
+    }
+}
+
+/// A step that is shown.
+#[pymethods]
+impl Step {
+    fn __repr__(&self) -> String {
+        let found = match self.locked {
+            Some(true) => ", locked",
+            Some(false) => ", not locked",
+            None => "",
+        };
+        format!("<Step {}: {} iterations, {:.3} ms{found}>", self.sample, self.iterations, self.milliseconds)
+    }
+}

@@ -1,0 +1,76 @@
+"""Every public function and class says what it does, with an example that is run."""
+
+from __future__ import annotations
+
+import copy
+import doctest
+import importlib
+import inspect
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import scrnn
+
+MODULES = ["_data", "_results", "_estimators", "_following", "_studies"]
+
+
+def examples() -> list[Any]:
+    finder = doctest.DocTestFinder()
+    found = []
+    for name in MODULES:
+        found += [one for one in finder.find(importlib.import_module(f"scrnn.{name}")) if one.examples]
+    return found
+
+
+@pytest.mark.parametrize("example", examples(), ids=lambda one: one.name.replace("scrnn.", ""))
+def test_the_example_holds(example: Any, trained: scrnn.SCTRNN, tmp_path: Path) -> None:
+    # The waves of the examples are small: the network of the tests learned channels a and b.
+    t = np.arange(40)
+    wave = np.c_[0.6 * np.sin(t / 4), np.cos(t / 7)]
+    new = [0.8 * wave, 0.7 * wave[::-1]]
+    net = example_network(wave)
+    example.globs.update(scrnn=scrnn, np=np, os=os, net=net, wave=wave, new=new, folder=tmp_path)
+    runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.IGNORE_EXCEPTION_DETAIL * 0)
+    runner.run(example)
+    assert runner.failures == 0
+
+
+_NETWORK: list[scrnn.SCTRNN] = []
+
+
+def example_network(wave: Any) -> scrnn.SCTRNN:
+    """Trained once, copied for each example."""
+    if not _NETWORK:
+        other = np.c_[0.6 * np.sin(np.arange(40) / 2), np.cos(np.arange(40) / 3)]
+        net = scrnn.SCTRNN(units=6, time_constant=3.0, epochs=400)
+        _NETWORK.append(net.fit([wave, other], channels=["a", "b"], names=["slow", "fast"]))
+    return copy.copy(_NETWORK[0])
+
+
+def public() -> list[Any]:
+    """Everything in `scrnn.__all__`, with the public methods and properties of its classes."""
+    found: list[Any] = []
+    for name in scrnn.__all__:
+        thing = getattr(scrnn, name)
+        if name.startswith("__"):
+            continue
+        found.append(pytest.param(thing, id=name))
+        if inspect.isclass(thing) and thing.__module__ != "builtins" and not issubclass(thing, (Exception, tuple)):
+            for attribute, member in vars(thing).items():
+                if not attribute.startswith("_") and (callable(member) or isinstance(member, (property, staticmethod))):
+                    found.append(pytest.param(member, id=f"{name}.{attribute}"))
+    return found
+
+
+@pytest.mark.parametrize("thing", public())
+def test_it_says_what_it_does(thing: Any) -> None:
+    text = inspect.getdoc(thing)
+    assert text and len(text) > 15
+    name = getattr(thing, "__name__", "")
+    own = inspect.isfunction(thing) and not name.startswith("_")
+    if own and name not in ("close",) and "Recognized" not in name:
+        assert ">>>" in text, f"{name} has no example"
