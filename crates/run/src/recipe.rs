@@ -313,6 +313,21 @@ mod tests {
     }
 
     #[test]
+    fn noisy_sequences_share_a_state_and_are_not_learned_for_long() {
+        let noisy = |sequences: usize| {
+            let noise = |k: usize| ((k * k * 7919) % 1009) as f64 / 504.5 - 1.0;
+            let values = |s: usize| (0..100).map(|k| noise(k + 101 * s)).collect();
+            let one = |s: usize| Sequence::new(s.to_string(), 1, values(s)).unwrap();
+            choose(&Dataset::new(vec!["y".into()], (0..sequences).map(one).collect()).unwrap())
+        };
+        for (sequences, epochs) in [(3, 1000), (40, 1000), (100, 400), (2000, 20)] {
+            let Recipe { network, training, .. } = noisy(sequences);
+            assert_eq!((network.skip, network.initial_state_variance), (SkipName::None, 0.0));
+            assert_eq!((training.epochs, training.adam.unwrap().weight_decay), (epochs, DECAY));
+        }
+    }
+
+    #[test]
     fn numbers_are_rounded_to_two_digits() {
         assert_eq!([rounded(1234.0), rounded(987.0), rounded(56.0)], [1200, 990, 56]);
     }
