@@ -8,6 +8,8 @@ mod crafted;
 mod evaluating;
 #[path = "cli/experiments.rs"]
 mod experiments;
+#[path = "cli/exporting.rs"]
+mod exporting;
 #[path = "cli/extremes.rs"]
 mod extremes;
 #[path = "cli/following.rs"]

@@ -7,7 +7,7 @@ use scrnn::engine::InstructionSet;
 
 use crate::args::Shared;
 use crate::command::{
-    completions, convert, data, evaluate, generate, inspect, recognize, report, reproduce, simulate, train,
+    completions, convert, data, evaluate, export, generate, inspect, recognize, report, reproduce, simulate, train,
 };
 
 static VERSION: LazyLock<String> =
@@ -68,6 +68,7 @@ pub enum Command {
     Report(report::Arguments),
     Inspect(inspect::Arguments),
     Convert(convert::Arguments),
+    Export(export::Arguments),
     /// Print the JSON schema of the experiment file
     ///
     /// Editors with a TOML language server complete and check an experiment file that begins with

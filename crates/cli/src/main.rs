@@ -41,6 +41,7 @@ fn run() -> u8 {
         Command::Report(arguments) => command::report::run(&arguments, &shared),
         Command::Inspect(arguments) => command::inspect::run(&arguments, &shared),
         Command::Convert(arguments) => command::convert::run(&arguments, &shared),
+        Command::Export(arguments) => command::export::run(&arguments, &shared),
         Command::Schema => command::schema::run(),
         Command::Completions(arguments) => command::completions::run(&arguments),
     };

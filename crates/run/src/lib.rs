@@ -14,6 +14,7 @@
 //! | [`stream`] | samples that come line by line while they are made |
 //! | [`assessment`], [`truth`], [`channel_scores`] | how well it predicts, beside simple models and what is known of the noise |
 //! | [`generating`], [`recognising`], [`following`] | what a trained network is used for, in the data's units |
+//! | [`export`] | one step of a trained network for other programs: as C, as ONNX |
 //! | [`familiar`] | new data beside the range of what was learned |
 //! | [`conversion`] | data from one kind of file to another |
 //! | [`likeness`] | which learned sequence a new one is like, where all share one initial state |
@@ -36,6 +37,7 @@ pub mod completion;
 pub mod conversion;
 pub mod evaluation;
 pub mod experiment;
+pub mod export;
 pub mod failure;
 pub mod familiar;
 pub mod following;

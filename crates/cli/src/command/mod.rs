@@ -4,6 +4,7 @@ pub mod completions;
 pub mod convert;
 pub mod data;
 pub mod evaluate;
+pub mod export;
 pub mod generate;
 pub mod inspect;
 pub mod recognize;

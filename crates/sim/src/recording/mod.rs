@@ -55,6 +55,7 @@ mod types;
 mod wire;
 
 pub use error::RecordingError;
+pub use wire::Message as ProtobufMessage;
 
 /// What a recording says of itself.
 #[derive(Debug, Clone, Copy, Default)]

@@ -1,6 +1,6 @@
 //! Protocol buffers, as much of them as a recording needs: messages as bytes, and descriptions of their types.
 
-/// A message under construction. Fields that hold their default are left out, as in proto3.
+/// A protobuf message under construction. Fields that hold their default are left out, as in proto3.
 #[derive(Debug, Default)]
 pub struct Message {
     bytes: Vec<u8>,
@@ -36,8 +36,8 @@ impl Message {
         }
     }
 
-    /// An integer of a type that tells 0 from nothing.
-    fn integer_or_zero(&mut self, field: u32, value: u64) {
+    /// An integer of a type that tells 0 from nothing, or one more of a list.
+    pub fn integer_or_zero(&mut self, field: u32, value: u64) {
         self.key(field, Layout::Varint);
         self.varint(value);
     }
@@ -47,6 +47,11 @@ impl Message {
         if !value.is_empty() {
             self.delimited(field, value.as_bytes());
         }
+    }
+
+    /// Bytes as they are.
+    pub fn bytes(&mut self, field: u32, bytes: &[u8]) {
+        self.delimited(field, bytes);
     }
 
     /// A message inside of this one, or one more of a list.
