@@ -92,6 +92,20 @@ pub struct View {
     pub variance: Vec<Vec<f64>>,
 }
 
+/// What a [`View`] holds, row after row in one list each, for callers that have no time for lists of lists.
+#[derive(Debug, Clone, Default)]
+#[non_exhaustive]
+pub struct Flat {
+    /// What the window now says about its samples, in the network's units: steps x channels. Few look at it each time.
+    pub smoothed: Vec<f64>,
+    /// The contexts that go with them, if they were asked for: steps x context units.
+    pub contexts: Vec<f64>,
+    /// What is predicted of the samples to come: the next one, then those of the forecast.
+    pub predicted: Vec<f64>,
+    /// The variances of these; empty without variance units.
+    pub variance: Vec<f64>,
+}
+
 /// One sequence, followed to its end.
 #[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]
@@ -278,6 +292,31 @@ impl Following {
                 false => Vec::new(),
             },
         }
+    }
+
+    /// The same as [`Following::view`], row after row, but what is smoothed as the network has it; contexts only if they are wanted.
+    pub fn flat(&self, contexts: bool) -> Flat {
+        let scaling = &self.trained.checkpoint.scaling;
+        let (window, n) = (self.regression.window(), self.scaled.len());
+        let ahead = if self.predicts() { self.options.ahead + 1 } else { 0 };
+        let mut flat = Flat::default();
+        flat.smoothed.reserve_exact(window * n);
+        (0..window).filter_map(|k| self.regression.smoothed_mean(k)).for_each(|row| flat.smoothed.extend_from_slice(row));
+        if contexts {
+            flat.contexts.reserve_exact(window * self.trained.checkpoint.topology.context_units());
+            (0..window).filter_map(|k| self.regression.context(k)).for_each(|row| flat.contexts.extend_from_slice(row));
+        }
+        flat.predicted.reserve_exact(ahead * n);
+        for row in (0..ahead).filter_map(|k| self.regression.forecast_mean(k)) {
+            flat.predicted.extend(row.iter().enumerate().map(|(i, &y)| scaling.to_raw(i, y)));
+        }
+        if self.trained.checkpoint.topology.has_variance() {
+            flat.variance.reserve_exact(ahead * n);
+            for row in (0..ahead).filter_map(|k| self.regression.forecast_variance(k)) {
+                flat.variance.extend(row.iter().enumerate().map(|(i, &v)| scaling.variance_to_raw(i, v)));
+            }
+        }
+        flat
     }
 
     /// How many samples came.
