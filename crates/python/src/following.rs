@@ -5,12 +5,13 @@ use std::time::Duration;
 
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
 use scrnn::error_regression::{Ascent, ErrorRegressionOptions};
 use scrnn_run::failure::Failure;
 use scrnn_run::following::{Begin, Deadline, Following};
 use scrnn_run::trained::Trained;
 
-use crate::arrays::rows;
+use crate::arrays::matrix;
 use crate::failure::compute;
 use crate::machine::engine;
 use crate::model::Model;
@@ -19,33 +20,47 @@ use crate::model::Model;
 const THESIS_RATE: f64 = 1e-4;
 
 /// What became of one sample, in the data's units.
-#[pyclass(frozen, get_all, module = "scrnn._scrnn")]
+#[pyclass(frozen, module = "scrnn._scrnn")]
 pub struct Step {
     /// Its number, from 1.
+    #[pyo3(get)]
     sample: usize,
     /// The next sample's mean, (C,); None before the network's delay is over.
+    #[pyo3(get)]
     mean: Option<Py<PyArray1<f64>>>,
     /// The next sample's variance, (C,); None without variance units.
+    #[pyo3(get)]
     variance: Option<Py<PyArray1<f64>>>,
     /// Means of the samples after the next one, (ahead, C).
+    #[pyo3(get)]
     forecast: Py<PyArray2<f64>>,
     /// Their variances; None without variance units.
+    #[pyo3(get)]
     forecast_variance: Option<Py<PyArray2<f64>>>,
-    /// What the window now says about its samples, (window, C).
-    smoothed: Py<PyArray2<f64>>,
-    /// The contexts that go with them, (window, units).
-    contexts: Py<PyArray2<f64>>,
+    /// What the window now says about its samples, in the network's units, and as Python gets it once it asks.
+    window: Vec<f64>,
+    trained: Arc<Trained>,
+    smoothed: PyOnceLock<Py<PyArray2<f64>>>,
+    /// The contexts that go with them, (window, units); None unless they were asked for.
+    #[pyo3(get)]
+    contexts: Option<Py<PyArray2<f64>>>,
     /// Nats per observed value of the window, before and after.
+    #[pyo3(get)]
     log_likelihood: Option<(f64, f64)>,
     /// Half the mean squared error over the window, before and after, in scaled units.
+    #[pyo3(get)]
     error: Option<(f64, f64)>,
     /// Whether the window is as likely as what was learned, but for one nat per step and channel.
+    #[pyo3(get)]
     locked: Option<bool>,
     /// Updates that were made.
+    #[pyo3(get)]
     iterations: usize,
     /// How long it took.
+    #[pyo3(get)]
     milliseconds: f64,
     /// Channels that had no value.
+    #[pyo3(get)]
     missing: Vec<String>,
 }
 
@@ -53,15 +68,18 @@ pub struct Step {
 #[pyclass(frozen, module = "scrnn._scrnn")]
 pub struct Follower {
     following: Mutex<Following>,
+    trained: Arc<Trained>,
     channels: Vec<String>,
     units: usize,
+    /// Whether contexts are told.
+    contexts: bool,
 }
 
 #[pymethods]
 impl Follower {
     #[new]
     #[pyo3(signature = (model, *, window=50, iterations=10, ahead=10, optimiser=None, rate=None, momentum=None, max_norm=None,
-        deadline=None, closed_channels=vec![], masked_channels=vec![], begin=None, sequence=None, instruction_set=None))]
+        deadline=None, closed_channels=vec![], masked_channels=vec![], begin=None, sequence=None, contexts=false, instruction_set=None))]
     #[expect(clippy::too_many_arguments, reason = "they come by name, from one place in the Python layer")]
     fn new(
         py: Python<'_>,
@@ -78,6 +96,7 @@ impl Follower {
         masked_channels: Vec<String>,
         begin: Option<&str>,
         sequence: Option<String>,
+        contexts: bool,
         instruction_set: Option<&str>,
     ) -> PyResult<Self> {
         compute(py, || {
@@ -130,8 +149,8 @@ impl Follower {
             let trained = Arc::new(Trained::of(only.path.clone(), only.checkpoint.clone())?);
             let units = trained.checkpoint.topology.context_units();
             let engine = engine(1, instruction_set)?;
-            let following = Following::new(trained, options, begin, Deadline::new(limit), engine)?;
-            Ok(Self { following: Mutex::new(following), channels, units })
+            let following = Following::new(trained.clone(), options, begin, Deadline::new(limit), engine)?;
+            Ok(Self { following: Mutex::new(following), trained, channels, units, contexts })
         })
     }
 
@@ -145,25 +164,30 @@ impl Follower {
                 &own
             }
         };
-        let (told, view, missing) = compute(py, || {
+        let (told, flat, missing) = compute(py, || {
             let mut following = self.following.lock().unwrap_or_else(PoisonError::into_inner);
             let done = following.observe(values)?;
             let missing: Vec<String> = following.missing().iter().map(|&c| self.channels[c].clone()).collect();
-            Ok((following.told(&done, false), following.view(), missing))
+            Ok((following.told(&done, false), following.flat(self.contexts), missing))
         })?;
         let n = self.channels.len();
-        let first = |rows: &[Vec<f64>]| rows.first().map(|row| PyArray1::from_slice(py, row).unbind());
-        let rest = |all: &[Vec<f64>]| rows(py, all.get(1..).unwrap_or_default(), n).map(Bound::unbind);
+        let first = |values: &[f64]| values.get(..n).map(|row| PyArray1::from_slice(py, row).unbind());
+        let rest = |mut values: Vec<f64>| {
+            values.drain(..n.min(values.len()));
+            matrix(py, values, n).map(Bound::unbind)
+        };
         let pair = |pair: Option<[f64; 2]>| pair.map(|[before, after]| (before, after));
-        let has_variance = !view.variance.is_empty();
+        let has_variance = !flat.variance.is_empty();
         Ok(Step {
             sample: told.sample,
-            mean: first(&view.predicted),
-            variance: first(&view.variance),
-            forecast: rest(&view.predicted)?,
-            forecast_variance: has_variance.then(|| rest(&view.variance)).transpose()?,
-            smoothed: rows(py, &view.smoothed, n)?.unbind(),
-            contexts: rows(py, &view.contexts, self.units)?.unbind(),
+            mean: first(&flat.predicted),
+            variance: first(&flat.variance),
+            forecast: rest(flat.predicted)?,
+            forecast_variance: if has_variance { Some(rest(flat.variance)?) } else { None },
+            window: flat.smoothed,
+            trained: self.trained.clone(),
+            smoothed: PyOnceLock::new(),
+            contexts: if self.contexts { Some(matrix(py, flat.contexts, self.units)?.unbind()) } else { None },
             log_likelihood: pair(told.ln_likelihood),
             error: pair(told.error),
             locked: told.locked,
@@ -195,6 +219,18 @@ impl Follower {
 /// A step that is shown.
 #[pymethods]
 impl Step {
+    /// What the window now says about its samples, (window, C).
+    #[getter]
+    fn smoothed(&self, py: Python<'_>) -> PyResult<Py<PyArray2<f64>>> {
+        let raw = || {
+            let scaling = &self.trained.checkpoint.scaling;
+            let n = scaling.channels();
+            let values = self.window.iter().enumerate().map(|(k, &y)| scaling.to_raw(k % n, y)).collect();
+            Ok::<_, PyErr>(matrix(py, values, n)?.unbind())
+        };
+        Ok(self.smoothed.get_or_try_init(py, raw)?.clone_ref(py))
+    }
+
     fn __repr__(&self) -> String {
         let found = match self.locked {
             Some(true) => ", locked",

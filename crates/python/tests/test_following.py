@@ -13,7 +13,7 @@ from conftest import movement
 
 
 def test_a_step_has_what_it_says(trained: scrnn.SCTRNN) -> None:
-    live = trained.follow(window=8, iterations=3, ahead=4)
+    live = trained.follow(window=8, iterations=3, ahead=4, contexts=True)
     for k, x in enumerate(movement(4.0)):
         step = live.observe(x)
         assert step.sample == k + 1 == live.taken
@@ -24,7 +24,16 @@ def test_a_step_has_what_it_says(trained: scrnn.SCTRNN) -> None:
     before, after = step.log_likelihood
     assert after >= before and step.locked in (True, False)
     assert live.latency.longest >= live.latency.median > 0 and live.latency.missed is None
+    assert trained.follow().observe([0.0, 20.0]).contexts is None
     assert "Step 40" in repr(step) and "40 samples" in repr(live)
+
+
+def test_what_is_smoothed_stays_what_it_was_at_its_step(trained: scrnn.SCTRNN) -> None:
+    live, other = trained.follow(window=6, iterations=5), trained.follow(window=6, iterations=5)
+    steps = [live.observe(x) for x in movement(4.0)[:12]]
+    asked_at_once = [other.observe(x).smoothed for x in movement(4.0)[:12]]
+    for step, smoothed in zip(steps, asked_at_once):
+        assert (step.smoothed == smoothed).all() and step.smoothed is step.smoothed
 
 
 def test_it_finds_what_it_follows(trained: scrnn.SCTRNN) -> None:

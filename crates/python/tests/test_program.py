@@ -78,6 +78,10 @@ def test_training_on_data_alone_writes_the_same_bytes(both: tuple[scrnn.SCTRNN, 
     scrnn.train(folder / "new.csv", epochs=5, out=folder / "alone-python")
     for name in ("checkpoint.safetensors", "best.safetensors"):
         assert (folder / "alone" / name).read_bytes() == (folder / "alone-python" / name).read_bytes()
+    # Arrays that a recipe sees are those of the file.
+    chosen = scrnn.SCTRNN(recipe="auto").fit(scrnn.read(folder / "new.csv"), epochs=5)
+    alone = scrnn.load(folder / "alone")
+    assert all(chosen.params[name].tobytes() == alone.params[name].tobytes() for name in alone.params)
 
 
 def test_generation_writes_the_same_bytes(both: tuple[scrnn.SCTRNN, Path, Any]) -> None:

@@ -697,6 +697,7 @@ class Network:
         masked_channels: Sequence[str] | str = (),
         begin: str | None = None,
         sequence: str | int | None = None,
+        contexts: bool = False,
     ) -> Follower:
         """Begins to follow a stream of samples by error regression (thesis 2.10.2).
 
@@ -713,6 +714,7 @@ class Network:
             masked_channels: Channels whose errors do not count.
             begin: ``"mean"`` starts from the mean of the learned states and stays with it. By default the first samples choose.
             sequence: Start from the state of this learned sequence: its name, or its number from 1.
+            contexts: Tell the window's contexts with each step.
 
         Raises:
             scrnn.Error: An option is out of range, or this is a mixture.
@@ -740,6 +742,7 @@ class Network:
                 masked_channels=names_in(masked_channels),
                 begin=begin,
                 sequence=None if sequence is None else str(sequence),
+                contexts=bool(contexts),
                 instruction_set=self.instruction_set,
             )
         )

@@ -97,8 +97,8 @@ class Step:
     def smoothed(self) -> _Floats:
         """What the window now says about its samples, (window, channels)."""
     @property
-    def contexts(self) -> _Floats:
-        """The contexts that go with them, (window, units)."""
+    def contexts(self) -> _Floats | None:
+        """The contexts that go with them, (window, units); None unless they were asked for."""
     @property
     def log_likelihood(self) -> tuple[float, float] | None:
         """Nats per observed value of the window in scaled units, before and after the updates."""
@@ -136,6 +136,7 @@ class Follower:
         masked_channels: Sequence[str] = ...,
         begin: str | None = ...,
         sequence: str | None = ...,
+        contexts: bool = ...,
         instruction_set: str | None = ...,
     ) -> Follower: ...
     def observe(self, sample: _Floats) -> Step: ...

@@ -1,0 +1,26 @@
+"""The examples of the READMEs run as they stand."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).resolve().parent
+#: In the tree the package's and the project's; elsewhere those that SCRNN_READMES names.
+READMES = [Path(one) for one in os.environ.get("SCRNN_READMES", "").split(os.pathsep) if one] or [
+    HERE.parent / "README.md",
+    HERE.parents[2] / "README.md",
+]
+
+
+@pytest.mark.parametrize("readme", READMES, ids=lambda path: path.parent.name)
+def test_the_python_example_runs(readme: Path) -> None:
+    examples = re.findall(r"```python\n(.*?)```", readme.read_text(encoding="utf-8"), re.DOTALL)
+    assert examples, f"{readme} has no example"
+    for example in examples:
+        scope: dict[str, object] = {}
+        exec(compile(example, str(readme), "exec"), scope)
+        assert "net" in scope
