@@ -121,3 +121,13 @@ pub fn compute<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T> + Send)
         Err(panic) => Err(raise_panic(panic.as_ref())),
     }
 }
+
+/// Breaks down, for the tests: a panic must come out as an exception.
+#[pyfunction]
+pub fn break_down(py: Python<'_>, attended: bool) -> PyResult<()> {
+    let work = || -> Result<()> { panic!("broken down on purpose") };
+    match attended {
+        true => crate::machine::watched(py, &crate::machine::News::default(), work),
+        false => compute(py, work),
+    }
+}

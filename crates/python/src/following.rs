@@ -20,6 +20,10 @@ use crate::model::Model;
 const THESIS_RATE: f64 = 1e-4;
 
 /// What became of one sample, in the data's units.
+///
+/// >>> step = net.follow(window=5, ahead=3).observe(wave[0])
+/// >>> step.sample, step.mean.shape, step.forecast.shape, step.missing
+/// (1, (2,), (3, 2), [])
 #[pyclass(frozen, module = "scrnn._scrnn")]
 pub struct Step {
     /// Its number, from 1.

@@ -36,6 +36,7 @@ fn _scrnn(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("RefusedError", py.get_type::<failure::RefusedError>())?;
     module.add("DivergedError", py.get_type::<failure::DivergedError>())?;
     module.add("InternalError", py.get_type::<failure::InternalError>())?;
+    module.add_function(wrap_pyfunction!(failure::break_down, module)?)?;
     module.add_class::<model::Model>()?;
     module.add_class::<following::Follower>()?;
     module.add_class::<following::Step>()?;

@@ -15,7 +15,7 @@ import pytest
 
 import scrnn
 
-MODULES = ["_data", "_results", "_estimators", "_following", "_studies"]
+MODULES = ["_data", "_results", "_estimators", "_following", "_studies", "_scrnn"]
 
 
 def examples() -> list[Any]:
@@ -58,19 +58,30 @@ def public() -> list[Any]:
         thing = getattr(scrnn, name)
         if name.startswith("__"):
             continue
-        found.append(pytest.param(thing, id=name))
-        if inspect.isclass(thing) and thing.__module__ != "builtins" and not issubclass(thing, (Exception, tuple)):
+        found.append(pytest.param(name, thing, id=name))
+        if inspect.isclass(thing) and not issubclass(thing, (Exception, tuple)):
             for attribute, member in vars(thing).items():
-                if not attribute.startswith("_") and (callable(member) or isinstance(member, (property, staticmethod))):
-                    found.append(pytest.param(member, id=f"{name}.{attribute}"))
+                if not attribute.startswith("_") and (callable(member) or inspect.isdatadescriptor(member)):
+                    found.append(pytest.param(f"{name}.{attribute}", member, id=f"{name}.{attribute}"))
     return found
 
 
-@pytest.mark.parametrize("thing", public())
-def test_it_says_what_it_does(thing: Any) -> None:
+#: Classes whose words are a sentence, and fields of a compiled class, which the class' example shows.
+PLAIN = ("Error", "Step.")
+
+
+@pytest.mark.parametrize("name, thing", public())
+def test_it_says_what_it_does_with_an_example(name: str, thing: Any) -> None:
     text = inspect.getdoc(thing)
     assert text and len(text) > 15
-    name = getattr(thing, "__name__", "")
-    own = inspect.isfunction(thing) and not name.startswith("_")
-    if own and name not in ("close",) and "Recognized" not in name:
+    if not any(plain in name for plain in PLAIN):
         assert ">>>" in text, f"{name} has no example"
+
+
+@pytest.mark.parametrize("name", ["fit", "generate", "forecast", "recognize", "follow", "score", "evaluate", "calibrate"])
+def test_arguments_results_and_errors_are_told(name: str) -> None:
+    method = getattr(scrnn.SCTRNN, name)
+    text = inspect.getdoc(method) or ""
+    assert "Args:" in text and "Raises:" in text
+    missing = [one for one in inspect.signature(method).parameters if one != "self" and f"{one}:" not in text]
+    assert not missing, f"{name} does not say what {missing} are"

@@ -241,6 +241,28 @@ def test_ctrl_c_ends_the_epoch_and_keeps_the_state() -> None:
     assert 0 < net.epoch < 10_000_000
 
 
+def test_ctrl_c_ends_a_study_and_the_same_call_goes_on(tmp_path: Path) -> None:
+    import os
+    import signal
+
+    timer = threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT))
+    timer.start()
+    begun = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        scrnn.reproduce("sinusoid", epochs=10_000_000, out=tmp_path / "s", progress=False)
+    timer.join()
+    assert time.monotonic() - begun < 20 and list((tmp_path / "s").rglob("checkpoint.safetensors"))
+
+
+@pytest.mark.parametrize("attended", [False, True])
+def test_a_panic_is_an_exception(attended: bool) -> None:
+    from scrnn import _scrnn
+
+    with pytest.raises(scrnn.InternalError, match="broken down on purpose"):
+        _scrnn.break_down(attended)
+    assert issubclass(scrnn.InternalError, ValueError)
+
+
 def test_other_threads_run_while_it_computes() -> None:
     counted = 0
     done = threading.Event()

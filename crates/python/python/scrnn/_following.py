@@ -77,12 +77,20 @@ class Follower:
 
     @property
     def channels(self) -> list[str]:
-        """Names of the channels, in the order of a sample's values."""
+        """Names of the channels, in the order of a sample's values.
+
+        >>> net.follow().channels
+        ['a', 'b']
+        """
         return self._follower.channels
 
     @property
     def taken(self) -> int:
-        """How many samples came."""
+        """How many samples came.
+
+        >>> net.follow().taken
+        0
+        """
         return self._follower.taken
 
     @property

@@ -48,7 +48,11 @@ class History(Mapping[str, Floats]):
 
     @property
     def rows(self) -> int:
-        """How many epochs were noted."""
+        """How many epochs were noted.
+
+        >>> net.history.rows
+        401
+        """
         return len(self._columns["epoch"]) if "epoch" in self._columns else 0
 
     def to_pandas(self) -> pd.DataFrame:
@@ -332,7 +336,12 @@ class Evaluation(Report):
 
     @property
     def calibration(self) -> Any:
-        """Bins of predicted standard deviations beside the errors' (scaled units); None without variance units."""
+        """Predicted standard deviations beside the errors', in scaled units: ``within_one``, ``within_two``, ``mean_square``, ``bins``;
+        None without variance units.
+
+        >>> net.evaluate(new, samples=1, starts=1, epochs=0).calibration["within_two"] <= 1
+        True
+        """
         return self.values["calibration"]
 
     def __repr__(self) -> str:
