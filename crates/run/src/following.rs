@@ -301,7 +301,9 @@ impl Following {
         let ahead = if self.predicts() { self.options.ahead + 1 } else { 0 };
         let mut flat = Flat::default();
         flat.smoothed.reserve_exact(window * n);
-        (0..window).filter_map(|k| self.regression.smoothed_mean(k)).for_each(|row| flat.smoothed.extend_from_slice(row));
+        (0..window)
+            .filter_map(|k| self.regression.smoothed_mean(k))
+            .for_each(|row| flat.smoothed.extend_from_slice(row));
         if contexts {
             flat.contexts.reserve_exact(window * self.trained.checkpoint.topology.context_units());
             (0..window).filter_map(|k| self.regression.context(k)).for_each(|row| flat.contexts.extend_from_slice(row));
