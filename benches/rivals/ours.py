@@ -8,6 +8,7 @@ import json
 import os
 import pathlib
 import resource
+import shutil
 import subprocess
 import tempfile
 
@@ -19,6 +20,10 @@ from method import Method
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 
 # Nothing is chosen here: `scrnn train FILE` writes the experiment that it takes, as it would for anybody. One thread, for the time.
+
+# An array is steps x channels. The program asks where that is not plain, as of a beginning of 6 steps on 12 channels.
+AXES = ("--axes", "tc")
+RUNS = pathlib.Path(__file__).resolve().parent / "results" / "runs"
 
 
 def program():
@@ -48,30 +53,39 @@ def read(path, field):
     return [held[name] for name in sorted(names, key=lambda name: int(name.rsplit("_", 1)[1]))]
 
 
+def trained(task, seed, quick):
+    """The run of a task and a seed, and its processor time."""
+    at = RUNS / ("quick" if quick else "full") / f"{task.name}.{seed}"
+    kept = at / "seconds.json"
+    if not kept.exists():
+        shutil.rmtree(at, ignore_errors=True)
+        at.mkdir(parents=True)
+        write(at / "learned.npz", task.part(task.learned)[0])
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        shorter = ("--set", "training.epochs=100") if quick else ()
+        scrnn("train", at / "learned.npz", *AXES, "--out", at / "run", "--seed", seed, *shorter)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        kept.write_text(json.dumps(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime))
+    return at / "run", json.loads(kept.read_text())
+
+
 class Scrnn(Method):
-    """One network for all labels, told neither label nor length."""
+    """One network for all labels, told neither label nor length. Runs are kept beside the results, and not trained again."""
 
     copies_ahead = 10
-    options = ()
 
     def fit(self, task, seed, quick):
         self.task, self.seed = task, seed
         self.folder = tempfile.TemporaryDirectory(prefix="rivals-")
         self.at = pathlib.Path(self.folder.name)
-        write(self.at / "learned.npz", task.part(task.learned)[0])
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        shorter = ("--set", "training.epochs=100") if quick else ()
-        arguments = ("train", self.at / "learned.npz", "--out", self.at / "run", "--seed", seed, "--json", *self.options, *shorter)
-        self.result = json.loads(scrnn(*arguments))
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        self.seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        self.run, self.seconds = trained(task, seed, quick)
 
     def generate(self, name, sequences, *arguments):
         """Means, variances and samples; the network hears the sequences, then itself."""
         write(self.at / f"{name}.npz", sequences)
         out = self.at / f"{name}-generated.npz"
-        told = ("--mode", "open", "--mean", "--seed", self.seed, *arguments)
-        scrnn("generate", self.at / "run", "--data", self.at / f"{name}.npz", "--out", out, *told)
+        told = (*AXES, "--mode", "open", "--mean", "--seed", self.seed, *arguments)
+        scrnn("generate", self.run, "--data", self.at / f"{name}.npz", "--out", out, *told)
         return functools.partial(read, out)
 
     def one_step(self, sequences, labels):
@@ -115,42 +129,26 @@ class Scrnn(Method):
 
     def recognise(self, sequences):
         write(self.at / "recognise.npz", sequences)
-        found = json.loads(scrnn("recognize", self.at / "run", self.at / "recognise.npz", "--json"))
+        found = json.loads(scrnn("recognize", self.run, self.at / "recognise.npz", *AXES, "--json"))
         labels = self.task.part(self.task.learned)[1]
         found = found if isinstance(found, list) else found["sequences"]
         return [labels[one["learned"][0]["number"] - 1] for one in found]
 
     def notes(self):
-        return {"seconds_of_training": self.seconds, "train": self.result}
+        return {"seconds_of_training": self.seconds}
 
 
-class ScrnnMembers(Method):
-    """Four networks of different seeds, mixed with equal weights."""
+class ScrnnMembers(Scrnn):
+    """A mixture of four networks, as `training.members = 4` makes it: of this seed and the three after it."""
 
+    seeds = (1,)
     members = 4
 
     def fit(self, task, seed, quick):
-        self.networks = [Scrnn() for _ in range(self.members)]
-        for k, network in enumerate(self.networks):
-            network.fit(task, 100 * seed + k, quick)
-
-    def mixed(self, parts):
-        return [measures.moments(np.stack([m for m, _ in of]), np.stack([v for _, v in of])) for of in zip(*parts, strict=True)]
-
-    def one_step(self, sequences, labels):
-        return self.mixed([network.one_step(sequences, labels) for network in self.networks])
-
-    def ahead(self, sequences, labels, steps):
-        return self.mixed([network.ahead(sequences, labels, steps) for network in self.networks])
-
-    def complete(self, observed, length, label, copies, rng):
-        share = max(2, copies // self.members)
-        parts = [network.rolled(observed, length - len(observed), share) for network in self.networks]
-        means, variances, samples = (np.concatenate(part) for part in zip(*parts, strict=True))
-        return (*measures.moments(means, variances), samples)
-
-    def beyond(self, observed, length, label, steps):
-        return np.mean([network.beyond(observed, length, label, steps) for network in self.networks], axis=0)
-
-    def notes(self):
-        return {"members": [network.notes() for network in self.networks]}
+        super().fit(task, seed, quick)
+        self.run, self.seconds = self.at / "mixture", 0.0
+        self.run.mkdir()
+        for k in range(self.members):
+            run, seconds = trained(task, seed + k, quick)
+            shutil.copytree(run, self.run / f"member-{k + 1}")
+            self.seconds += seconds
