@@ -2,6 +2,7 @@
 //!
 //! A remark never stops anything: what must stop is an error.
 
+use scrnn::dataset::Dataset;
 use serde::Serialize;
 
 /// How much it matters.
@@ -177,6 +178,28 @@ pub enum Remark {
 }
 
 impl Remark {
+    /// What is missing in `data`, a remark for each channel of which something is.
+    #[must_use]
+    pub fn of_missing(data: &Dataset) -> Vec<Self> {
+        let n = data.channels().len();
+        let mut missing = vec![0; n];
+        for sequence in data.sequences().iter().filter(|sequence| sequence.missing() > 0) {
+            for (index, _) in sequence.values().iter().enumerate().filter(|(_, value)| value.is_nan()) {
+                missing[index % n] += 1;
+            }
+        }
+        Self::of_counts(data.channels(), &missing, data.total_samples())
+    }
+
+    /// The same, from how many of so many samples each channel lacks.
+    pub(crate) fn of_counts(channels: &[String], missing: &[usize], samples: usize) -> Vec<Self> {
+        let of = |(channel, &missing): (&String, &usize)| match missing == samples {
+            true => Self::NeverObserved { channel: channel.clone() },
+            false => Self::MissingValues { channel: channel.clone(), missing, samples },
+        };
+        channels.iter().zip(missing).filter(|(_, missing)| **missing > 0).map(of).collect()
+    }
+
     /// How much it matters.
     #[must_use]
     pub fn level(&self) -> Level {

@@ -144,13 +144,7 @@ impl Samples {
                 missing[index % channels] += 1;
             }
         }
-        for (channel, missing) in self.channels.iter().zip(missing).filter(|(_, missing)| *missing > 0) {
-            let channel = channel.clone();
-            self.remarks.push(match missing == samples {
-                true => Remark::NeverObserved { channel },
-                false => Remark::MissingValues { channel, missing, samples },
-            });
-        }
+        self.remarks.extend(Remark::of_counts(&self.channels, &missing, samples));
         Ok(())
     }
 }

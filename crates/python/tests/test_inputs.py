@@ -214,3 +214,15 @@ def test_a_channel_that_never_moves_is_refused_or_floored() -> None:
     with pytest.warns(scrnn.DataWarning):
         with pytest.raises(scrnn.Error, match="never changes"):
             learn([still])
+
+
+def test_what_is_mostly_or_wholly_missing_is_told() -> None:
+    data = movement(4.0)
+    data[::2, 0] = np.nan
+    data[1:6, 0] = np.nan
+    with pytest.warns(scrnn.DataWarning, match="channel y1: 23 of 40 samples are missing"):
+        learn([data])
+    data[:, 0] = np.nan
+    with pytest.warns(scrnn.DataWarning, match="never observed"):
+        with pytest.raises(scrnn.Error, match="channel y1 was never observed"):
+            learn([data])

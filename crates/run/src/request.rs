@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use scrnn::dataset::Dataset;
+use scrnn_data::Remark;
 use scrnn_data::format::Format;
 
 use crate::experiment::{self, Comment, Data, Experiment, Override, ScalingChoice};
@@ -134,7 +135,13 @@ pub fn of_text(name: &str, text: &str, folder: &Path, at_hand: Option<Dataset>) 
 /// What is at hand, or what the files hold.
 fn source_of(data: &Data, at_hand: Option<Dataset>) -> Result<Source> {
     match at_hand {
-        Some(sequences) => source::at_hand(sequences, data.rest),
+        Some(sequences) => {
+            // Files tell it while they are read.
+            let missing = Remark::of_missing(&sequences);
+            let mut source = source::at_hand(sequences, data.rest)?;
+            source.remarks.splice(0..0, missing);
+            Ok(source)
+        }
         None => source::load(data, 1),
     }
 }

@@ -263,6 +263,14 @@ fn refuse_unbounded(data: &Dataset, topology: &Topology) -> Result<()> {
     if !topology.has_variance() || topology.variance_floor() > 0.0 {
         return Ok(());
     }
+    let n = data.channels().len();
+    let is_there = |i: usize| {
+        data.sequences().iter().any(|one| one.values().iter().skip(i).step_by(n).any(|value| !value.is_nan()))
+    };
+    if let Some(i) = (0..n).find(|i| !is_there(*i)) {
+        let message = format!("channel {} was never observed: all its samples are missing", data.channels()[i]);
+        return Err(Failure::input(message, "leave it out: `channels` in [data] names what to learn"));
+    }
     let still = still_channels(data, topology.delay());
     let Some(first) = still.first() else { return Ok(()) };
     let what = if still.len() == 1 {
