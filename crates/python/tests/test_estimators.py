@@ -457,7 +457,9 @@ def test_the_history_has_columns(trained: scrnn.SCTRNN, tmp_path: Path) -> None:
     assert list(history)[:3] == ["epoch", "nll", "mse"] and history.rows == 401
     assert isinstance(history.to_pandas(), pd.DataFrame) and len(history.to_pandas()) == 401
     history.to_csv(tmp_path / "h.csv")
-    assert (pd.read_csv(tmp_path / "h.csv", float_precision="round_trip")["nll"].to_numpy() == history["nll"]).all()
+    head, *rows = (tmp_path / "h.csv").read_text().splitlines()
+    assert head.split(",") == list(history)
+    assert [float(row.split(",")[1]) for row in rows] == history["nll"].tolist()
 
 
 def test_the_verdict_is_that_of_the_program(trained: scrnn.SCTRNN) -> None:

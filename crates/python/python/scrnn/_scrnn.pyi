@@ -12,6 +12,34 @@ _Given = tuple[list[str], list[str], list[_Floats]]
 _Show = Callable[[str, int, int, float | None, float, float | None], bool]
 _Say = Callable[[str], None]
 
+__all__ = [
+    "__version__",
+    "Error",
+    "FileError",
+    "RefusedError",
+    "DivergedError",
+    "InternalError",
+    "break_down",
+    "Model",
+    "Follower",
+    "Step",
+    "fit",
+    "train_paths",
+    "generate",
+    "go_on",
+    "recognize",
+    "score",
+    "evaluate",
+    "calibrate",
+    "read",
+    "write",
+    "task",
+    "studies",
+    "reproduce",
+    "simulate_reach",
+    "simulate_interact",
+]
+
 __version__: str
 
 class Error(ValueError): ...
@@ -34,6 +62,8 @@ class Model:
         experiment: str,
         data: _Given | None,
     ) -> Model: ...
+    def __copy__(self) -> Model: ...
+    def __deepcopy__(self, _memo: Any) -> Model: ...
     def save(self, folder: str, overwrite: bool) -> None: ...
     def spill(self, folder: str) -> None: ...
     def best(self) -> Model: ...
