@@ -15,8 +15,9 @@ Every error is a :class:`scrnn.Error`, which is a ``ValueError``.
 """
 
 from scrnn._data import DataWarning, Sequences, read, task
-from scrnn._estimators import SCTRNN, SMTRNN, Network, load, train
-from scrnn._following import Follower, Step
+from scrnn._estimators import SCTRNN, SMTRNN, Network, NotTrainedError, load, train
+from scrnn._following import Follower, Latency, Step
+from scrnn._progress import Progress
 from scrnn._results import (
     Calibration,
     Completed,
@@ -51,7 +52,10 @@ __all__ = [
     "Generated",
     "History",
     "InternalError",
+    "Latency",
     "Network",
+    "NotTrainedError",
+    "Progress",
     "Ranked",
     "Recognition",
     "RefusedError",

@@ -51,7 +51,11 @@ MACHINE = ("threads", "instruction_set")
 
 
 class NotTrainedError(_scrnn.Error, AttributeError):
-    """Something was asked of a network that is not trained yet."""
+    """Something was asked of a network that is not trained yet.
+
+    >>> hasattr(scrnn.SCTRNN(), "history")
+    False
+    """
 
 
 def plain(value: Any) -> Any:

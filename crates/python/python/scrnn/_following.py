@@ -13,7 +13,13 @@ from scrnn._scrnn import Step
 
 
 class Latency(NamedTuple):
-    """Milliseconds that samples took."""
+    """Milliseconds that samples took.
+
+    >>> live = net.follow(window=5)
+    >>> _ = live.observe(wave[0])
+    >>> live.latency.longest >= live.latency.median
+    True
+    """
 
     #: Half of them took less.
     median: float
