@@ -327,7 +327,6 @@ const HELD: usize = 3;
 
 fn staircase(series: &Series<'_>, channel: &str) -> Option<Suspicion> {
     let mut runs = Vec::new();
-    let mut distinct = std::collections::BTreeSet::new();
     for (_, values) in &series.parts {
         let mut run = 1;
         for pair in values.windows(2) {
@@ -335,18 +334,24 @@ fn staircase(series: &Series<'_>, channel: &str) -> Option<Suspicion> {
                 run += 1;
             } else {
                 runs.push(run as f64);
-                distinct.insert(pair[1].to_bits());
                 run = 1;
             }
         }
     }
-    // The ticks of an encoder and on-off signals come back to the same few values, at any time.
-    if runs.len() < FEWEST_STEPS || 2 * distinct.len() < runs.len() {
+    if runs.len() < FEWEST_STEPS {
         return None;
     }
     let middle = quantile(&mut runs, 0.5);
-    let even = runs.iter().filter(|run| (**run - middle).abs() <= 1.0).count();
-    (middle >= HELD as f64 && even * 10 >= runs.len() * 8)
+    let even = || runs.iter().filter(|run| (**run - middle).abs() <= 1.0).count();
+    if middle < HELD as f64 || even() * 10 < runs.len() * 8 {
+        return None;
+    }
+    // The ticks of an encoder and on-off signals come back to the same few values, at any time.
+    let pairs = series.parts.iter().flat_map(|(_, values)| values.windows(2));
+    let mut values: Vec<u64> = pairs.filter(|pair| pair[0] != pair[1]).map(|pair| pair[1].to_bits()).collect();
+    values.sort_unstable();
+    values.dedup();
+    (2 * values.len() >= runs.len())
         .then(|| Suspicion::Staircase { channel: channel.to_owned(), every: middle as usize })
 }
 
