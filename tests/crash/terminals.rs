@@ -24,8 +24,12 @@ fn on_a_terminal(place: &Place, trap: &str, arguments: &str) -> Child {
          while kill -0 $pid 2>/dev/null; do wait $pid; code=$?; done; echo $code > code",
         if trap.is_empty() { "" } else { "env --default-signal=HUP" }
     );
-    let mut command = Command::new("script");
-    command.args(["-q", "-e", "-f", "-c", &line, "/dev/null"]).current_dir(&place.0).env("SHELL", "/bin/sh");
+    // A shell cannot trap what its parent ignores, as under `nohup`.
+    let mut command = Command::new("env");
+    command
+        .args(["--default-signal=HUP", "script", "-q", "-e", "-f", "-c", &line, "/dev/null"])
+        .current_dir(&place.0)
+        .env("SHELL", "/bin/sh");
     command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap()
 }
 
