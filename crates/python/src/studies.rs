@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use pyo3::prelude::*;
-use scrnn::analysis::excursions::Side;
 use scrnn::engine::InstructionSet;
 use scrnn::error_regression::{Ascent, ErrorRegressionOptions};
 use scrnn::streams::Purpose;
@@ -198,7 +197,7 @@ pub fn simulate_interact(
                 Some(text) => parse_order(text)?,
                 None => random_order(BRANCHES, 0.5, seed, Purpose::TrialOrders, trial),
             };
-            let (name, state) = start(trained, begin, &order)?;
+            let (name, state) = trained.state_for_order(begin, &letters(&order))?;
             let scaling = &checkpoint.scaling;
             let controller = Controller { network: &network, scaling, initial_state: state, engine: &engine };
             let mut interaction = Interaction::new(&order, &InteractionOptions::default(), seed, trial)?;
@@ -216,24 +215,5 @@ pub fn simulate_interact(
     match signal {
         Some(signal) => Err(signal),
         None => Ok(told),
-    }
-}
-
-/// The state to start from, and its name.
-fn start<'a>(trained: &'a Trained, begin: &str, order: &[Side]) -> Result<(String, &'a [f64])> {
-    let (learned, names) = (&trained.checkpoint.initial_states, &trained.checkpoint.sequences);
-    let wanted = match begin {
-        "mean" => return Ok(("mean".to_owned(), learned.mean())),
-        "corresponding" => letters(order),
-        other => other.to_owned(),
-    };
-    // Data from several files have the file's name before that of the order.
-    let is = |name: &&String| name.as_str() == wanted || name.rsplit('/').next() == Some(wanted.as_str());
-    match names.iter().position(|name| is(&name)) {
-        Some(s) => Ok((wanted, learned.sequence(s))),
-        None => {
-            let help = format!("`mean`, `corresponding`, or one of {}", names.join(", "));
-            Err(Failure::input(format!("the network did not learn `{wanted}`"), help))
-        }
     }
 }

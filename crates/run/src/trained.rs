@@ -108,6 +108,29 @@ impl Trained {
         Err(Failure::input(format!("there is no learned sequence {wanted}"), help))
     }
 
+    /// The initial state for an interaction in this order of sides, and its name: `mean`, `corresponding` for that of the order itself, or
+    /// that of another learned order.
+    ///
+    /// # Errors
+    /// [`Failure::Input`] with what there is.
+    pub fn state_for_order(&self, wanted: &str, order: &str) -> Result<(String, &[f64])> {
+        let (learned, names) = (&self.checkpoint.initial_states, &self.checkpoint.sequences);
+        let wanted = match wanted {
+            "mean" => return Ok(("mean".to_owned(), learned.mean())),
+            "corresponding" => order,
+            other => other,
+        };
+        // Data from several files have the file's name before that of the order.
+        let is = |name: &String| name == wanted || name.rsplit('/').next() == Some(wanted);
+        match names.iter().position(is) {
+            Some(s) => Ok((wanted.to_owned(), learned.sequence(s))),
+            None => {
+                let help = format!("`mean`, `corresponding`, or one of {}", names.join(", "));
+                Err(Failure::input(format!("the network did not learn `{wanted}`"), help))
+            }
+        }
+    }
+
     /// Which part of its files it learned, where that is known.
     pub fn selection(&self) -> Option<Selection> {
         Some(self.notes.as_ref()?.experiment().ok()?.data.selection())

@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use scrnn::analysis::excursions::Side;
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions};
 use scrnn::streams::Purpose;
@@ -106,7 +105,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
             Some(text) => parse_order(text)?,
             None => random_order(BRANCHES, 0.5, arguments.seed, Purpose::TrialOrders, trial),
         };
-        let (initial_state, state) = arguments.start(&trained, &order)?;
+        let (initial_state, state) = trained.state_for_order(&arguments.initial_state, &letters(&order))?;
         let controller =
             Controller { network: &network, scaling: &checkpoint.scaling, initial_state: state, engine: &engine };
         let mut interaction = Interaction::new(&order, &InteractionOptions::default(), arguments.seed, trial)?;
@@ -155,25 +154,6 @@ impl Arguments {
             options.iterations = 0;
         }
         Ok(options)
-    }
-
-    /// The state to start from, and its name.
-    fn start<'a>(&self, trained: &'a Trained, order: &[Side]) -> Result<(String, &'a [f64])> {
-        let (learned, names) = (&trained.checkpoint.initial_states, &trained.checkpoint.sequences);
-        let wanted = match self.initial_state.as_str() {
-            "mean" => return Ok(("mean".to_owned(), learned.mean())),
-            "corresponding" => letters(order),
-            other => other.to_owned(),
-        };
-        // Data from several files have the file's name before that of the order.
-        let is = |name: &&String| name.as_str() == wanted || name.rsplit('/').next() == Some(wanted.as_str());
-        match names.iter().position(|name| is(&name)) {
-            Some(s) => Ok((wanted, learned.sequence(s))),
-            None => {
-                let help = format!("`mean`, `corresponding`, or one of {}", names.join(", "));
-                Err(Failure::input(format!("the network did not learn `{wanted}`"), help))
-            }
-        }
     }
 }
 
