@@ -5,6 +5,7 @@
 //! |---|---|
 //! | a single one | sequences x steps x channels, steps x channels, or steps |
 //! | one stem with numbers (`demo_0`, `demo_1`), or several lengths on the same channels | a sequence each |
+//! | two numbers in each name and nothing else that differs (`s1_trial2`), several channels, one length | a sequence each |
 //! | several stems with the same numbers (`qpos_0`, `action_0`, `qpos_1`, ...) | a sequence for each number, its arrays side by side |
 //! | different names, one length | groups of channels of one recording: `qpos.0`, ... |
 //!
@@ -269,7 +270,13 @@ fn plan(path: &str, arrays: &[Array], selection: &Selection) -> Result<Plan, Fil
         for (index, (stem, _)) in numbered.iter().enumerate() {
             stems.entry(stem).or_default().push(index);
         }
-        if stems.len() == 1 && same_channels && flat {
+        // Subjects and trials. Two arms of one recording are named so as well: that their recordings are of different lengths, but both arms
+        // of each of the same, would tell.
+        let differ_in_numbers = same_length && channels_of(&arrays[0].shape[1..]) > 1 && {
+            let model = without_digits(&arrays[0].name);
+            arrays.iter().all(|array| without_digits(&array.name) == model)
+        };
+        if (stems.len() == 1 || differ_in_numbers) && same_channels && flat {
             let mut order: Vec<usize> = (0..arrays.len()).collect();
             order.sort_by(|a, b| natural(&arrays[*a].name, &arrays[*b].name));
             if !as_written {
@@ -320,6 +327,10 @@ fn plan(path: &str, arrays: &[Array], selection: &Selection) -> Result<Plan, Fil
 fn stem_and_number(name: &str) -> Option<(&str, &str)> {
     let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
     (stem.len() < name.len()).then(|| (stem, &name[stem.len()..]))
+}
+
+fn without_digits(name: &str) -> String {
+    name.chars().filter(|c| !c.is_ascii_digit()).collect()
 }
 
 /// Asks if sequences have more channels than any of them has steps.

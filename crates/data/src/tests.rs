@@ -149,6 +149,29 @@ fn the_arrays_of_an_archive_are_its_sequences() {
     assert_eq!(parse_as(Path::new("x.npz"), &missing, &Selection::default()).unwrap().missing(), 1);
 }
 
+#[test]
+fn arrays_that_are_numbered_twice_are_sequences_unless_something_else_tells_them_apart() {
+    let rows = |lengths: &[usize]| npy::array_bytes(lengths, (0..lengths.iter().product()).map(|k: usize| k as f64));
+    let names = |members: &[&str], shape: &[usize]| {
+        let members: Vec<(&str, Vec<u8>)> = members.iter().map(|name| (*name, rows(shape))).collect();
+        let data = parse_as(Path::new("x.npz"), &archive(&members), &Selection::default()).unwrap();
+        let named = data.sequences().iter().map(|one| one.name.clone()).collect::<Vec<_>>();
+        (data.channels().len(), named)
+    };
+    let trials =
+        ["s2_trial1.npy", "s1_trial10.npy", "s1_trial2.npy", "s2_trial10.npy", "s1_trial1.npy", "s2_trial2.npy"];
+    let (channels, sequences) = names(&trials, &[4, 3]);
+    assert_eq!(channels, 3);
+    assert_eq!(sequences, ["s1_trial1", "s1_trial2", "s1_trial10", "s2_trial1", "s2_trial2", "s2_trial10"]);
+    // Of one channel each they are joints.
+    assert_eq!(
+        names(&["joint1_0.npy", "joint2_0.npy", "joint1_1.npy", "joint2_1.npy"], &[4]),
+        (2, vec!["0".into(), "1".into()])
+    );
+    // Words tell arrays apart that belong together.
+    assert_eq!(names(&["qpos_0.npy", "action_0.npy", "qpos_1.npy", "action_1.npy"], &[4, 3]).0, 6);
+}
+
 /// A generator of garbage that needs no crate (splitmix64).
 struct Garbage(u64);
 

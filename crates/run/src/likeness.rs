@@ -1,8 +1,11 @@
 //! Which learned sequence a new one is like, where all share one initial state.
 //!
 //! ```text
-//! distance(a, b) = mean over steps and units of (c_t(a) - c_t(b))^2,   t up to the shorter one's end
+//! distance(a, b) = mean over units i of (m_i(a) - m_i(b))^2 + (s_i(a) - s_i(b))^2
 //! ```
+//!
+//! m_i and s_i are mean and standard deviation of context unit i over what was heard of a sequence; this is the squared Wasserstein
+//! distance of two normal distributions. It does not ask that two sequences are in step, as a comparison step by step does.
 //!
 //! Where each learned sequence has an initial state of its own, recognition asks which of them makes the new samples most likely
 //! (thesis 2.9). Where they share one there is nothing to ask: but the network has heard both, and what it heard is in its contexts c.
@@ -19,12 +22,12 @@ use crate::trained::Trained;
 pub struct Likeness {
     /// The learned sequence, from 0.
     pub sequence: usize,
-    /// The mean squared difference of the contexts, 0 to 4.
+    /// The squared distance of means and standard deviations of the contexts, 0 to 4.
     pub distance: f64,
 }
 
-/// The learned sequences, the one most alike first, for each sequence of `new`, of which the first `heard` samples count. Both data sets
-/// are in their own units.
+/// The learned sequences, the one most alike first, for each sequence of `new`. Of all of them the first `heard` samples count. Both data
+/// sets are in their own units.
 ///
 /// # Errors
 /// Data that do not fit the network.
@@ -36,11 +39,13 @@ pub fn rank(
     engine: &Engine,
 ) -> Result<Vec<Vec<Likeness>>> {
     let units = trained.checkpoint.topology.context_units();
-    let known = contexts(trained, learned, usize::MAX, engine)?;
-    let found = contexts(trained, new, heard, engine)?;
-    let ranking = |own: &Vec<f64>| {
+    let heard = |data| -> Result<Vec<Moments>> {
+        Ok(contexts(trained, data, heard, engine)?.iter().map(|one| Moments::of(one, units)).collect())
+    };
+    let (known, found) = (heard(learned)?, heard(new)?);
+    let ranking = |own: &Moments| {
         let mut ranking: Vec<Likeness> = (known.iter().enumerate())
-            .map(|(sequence, other)| Likeness { sequence, distance: distance(own, other, units) })
+            .map(|(sequence, other)| Likeness { sequence, distance: own.distance(other) })
             .collect();
         ranking.sort_by(|a, b| a.distance.total_cmp(&b.distance));
         ranking
@@ -69,10 +74,31 @@ fn contexts(trained: &Trained, data: &Dataset, heard: usize, engine: &Engine) ->
     Ok(generated.into_iter().zip(scaled.sequences()).map(cut).collect())
 }
 
-fn distance(a: &[f64], b: &[f64], units: usize) -> f64 {
-    let len = a.len().min(b.len()) / units * units;
-    let squares: f64 = a[..len].iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum();
-    if len == 0 { f64::INFINITY } else { squares / len as f64 }
+/// Mean and standard deviation of each context unit over a sequence; empty where nothing was heard.
+struct Moments(Vec<(f64, f64)>);
+
+impl Moments {
+    /// Of contexts, `[step][unit]`.
+    fn of(contexts: &[f64], units: usize) -> Self {
+        let steps = (contexts.len() / units) as f64;
+        let mean = |value: &dyn Fn(f64) -> f64, unit: usize| {
+            contexts.iter().skip(unit).step_by(units).map(|&c| value(c)).sum::<f64>() / steps
+        };
+        let one = |unit| {
+            let average = mean(&|c| c, unit);
+            (average, mean(&|c| (c - average).powi(2), unit).sqrt())
+        };
+        Self(if steps > 0.0 { (0..units).map(one).collect() } else { Vec::new() })
+    }
+
+    /// Infinite where nothing was heard of one of the two.
+    fn distance(&self, other: &Self) -> f64 {
+        if self.0.is_empty() || other.0.is_empty() {
+            return f64::INFINITY;
+        }
+        let square = |((m, s), (n, t)): (&(f64, f64), &(f64, f64))| (m - n).powi(2) + (s - t).powi(2);
+        self.0.iter().zip(&other.0).map(square).sum::<f64>() / self.0.len() as f64
+    }
 }
 
 #[cfg(test)]
@@ -80,9 +106,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn contexts_are_compared_up_to_the_shorter_one() {
-        assert_eq!(distance(&[1.0, 0.0, 0.5, 0.5], &[0.0, 0.0], 2), 0.5);
-        assert_eq!(distance(&[0.1, 0.2], &[0.1, 0.2, 9.0, 9.0], 2), 0.0);
-        assert_eq!(distance(&[], &[1.0, 2.0], 2), f64::INFINITY);
+    fn contexts_are_alike_where_their_means_and_spreads_are() {
+        let of = |contexts: &[f64]| Moments::of(contexts, 2);
+        // Unit 1: 0 and 1, mean 0.5, deviation 0.5. Unit 2 stands at 0.5.
+        let swing = of(&[0.0, 0.5, 1.0, 0.5]);
+        assert_eq!(swing.0, [(0.5, 0.5), (0.5, 0.0)]);
+        assert_eq!(
+            swing.distance(&of(&[1.0, 0.5, 0.0, 0.5, 1.0, 0.5, 0.0, 0.5])),
+            0.0,
+            "out of step, and twice as long"
+        );
+        assert_eq!(swing.distance(&of(&[0.5, 0.5])), 0.125);
+        assert_eq!(of(&[1.0, -1.0]).distance(&of(&[-1.0, 1.0])), 4.0);
+        assert_eq!(swing.distance(&of(&[])), f64::INFINITY);
     }
 }
