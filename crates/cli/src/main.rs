@@ -70,7 +70,7 @@ fn code(ending: Result<Ending>, signal: Option<u8>) -> u8 {
         Ok(ending) => ending.code(),
         Err(failure) => {
             let code = match (&failure, signal) {
-                (Failure::Output { .. }, Some(signal)) => signal,
+                (Failure::Output { .. } | Failure::Stopped, Some(signal)) => signal,
                 _ => failure.code(),
             };
             output::show(failure);

@@ -72,6 +72,13 @@ impl Progress {
 }
 
 impl messages::Progress for Progress {
+    fn expect(&mut self, total: u64) {
+        self.total = total;
+        if let Display::Bar(bar) = &self.display {
+            bar.set_length(total);
+        }
+    }
+
     /// Keeps what is shown with the next epochs.
     fn held_out(&mut self, glance: &Glance) {
         let value = glance.one_step.nll.map_or(format!("{:.3e}", glance.one_step.mse), |nll| format!("{nll:.4}"));

@@ -118,6 +118,10 @@ struct Shown {
 }
 
 impl Progress for Shown {
+    fn expect(&mut self, total: u64) {
+        self.total = total;
+    }
+
     fn epoch(&mut self, report: &EpochReport) {
         let mut epochs = locked(&self.kept.epochs);
         let (epoch, nll, mse, held_out) = (report.epoch, report.nll, report.mse, self.held_out);
@@ -182,7 +186,11 @@ pub fn attended<T: Send>(
     if let Err(error) = news.deliver(py) {
         raised.get_or_insert(error);
     }
-    Ok((ended?, raised))
+    match (ended, raised) {
+        // It may have failed because of the wish.
+        (Err(_), Some(raised)) => Err(raised),
+        (ended, raised) => Ok((ended?, raised)),
+    }
 }
 
 /// As [`attended`], where a wish to stop ends nothing but is heard in the end.

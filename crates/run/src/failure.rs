@@ -84,6 +84,10 @@ pub enum Failure {
         #[help]
         help: String,
     },
+
+    /// Somebody asked to stop before there was anything to save.
+    #[error("interrupted before anything was learned")]
+    Stopped,
 }
 
 /// Bad input, with the place in the file where it is known.
@@ -111,6 +115,7 @@ impl Failure {
             Self::Input(_) | Self::File(_) => 2,
             Self::Refused { .. } => 5,
             Self::Output { .. } => 6,
+            Self::Stopped => Ending::Interrupted.code(),
         }
     }
 

@@ -52,6 +52,12 @@ pub(crate) fn learned(data: &Dataset, experiment: &Experiment) -> Result<Dataset
     }
 }
 
+/// What the experiment wants learned of `data`, and what not; nothing where it holds out none of these.
+pub(crate) fn both(data: &Dataset, experiment: &Experiment) -> Result<Option<(Dataset, Dataset)>> {
+    let Some(held) = held(data, experiment)? else { return Ok(None) };
+    Ok(Some((part(data, &held, false)?, part(data, &held, true)?)))
+}
+
 /// Whether each sequence is held out; none where the experiment holds out none of these.
 fn held(data: &Dataset, experiment: &Experiment) -> Result<Option<Vec<bool>>> {
     match &experiment.data.held_out {

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`experiment`] | the experiment file: its types, how it is read, checked, overridden and compared |
 //! | [`request`], [`recipe`] | what `train` is given: an experiment file, a run folder, or data alone, for which settings are chosen |
+//! | `trial` | how long to learn, by sequences that are left out for the choice |
 //! | [`source`] | the sequences of an experiment, made or read, and their fingerprint |
 //! | [`character`] | what kind of movement data are: smooth or noisy, and whether it comes to rest |
 //! | [`training`] | one training, from a resolved experiment to a run folder: begun, gone on with, or begun anew |
@@ -59,6 +60,7 @@ pub mod source;
 pub mod stream;
 pub mod trained;
 pub mod training;
+mod trial;
 pub mod truth;
 pub mod variance_factor;
 pub mod verdict;

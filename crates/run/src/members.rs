@@ -14,13 +14,16 @@ use serde::Serialize;
 use crate::evaluation::Member;
 use crate::experiment::{Experiment, HeldOut, HeldOutDrawn};
 use crate::failure::{Failure, Result};
-use crate::held_out::{Judgement, Watch};
+use crate::held_out::{self, Judgement, Watch};
 use crate::interrupt::Interrupt;
 use crate::messages::{Messages, Progress};
 use crate::notes::Score;
+use crate::recipe;
 use crate::run_folder::{BEST, CHECKPOINT, EXPERIMENT, HISTORY, RunFolder};
+use crate::source;
 use crate::trained::Trained;
-use crate::training::{Found, train, write_experiment};
+use crate::training::{Found, introduce, train, write_experiment};
+use crate::trial;
 
 /// Most networks of a mixture.
 pub const MOST: u64 = 100;
@@ -128,6 +131,17 @@ pub fn train_members(
             [CHECKPOINT, BEST, HISTORY, EXPERIMENT].into_iter().try_for_each(|name| member.remove(name))?;
         }
     }
+    // What a recipe leaves open is found out once, for all of them.
+    let (settled, introduced) = match experiment.comments.iter().any(recipe::leaves_open) {
+        true => {
+            let source = held_out::split(source::load(&experiment.data, cores)?, experiment)?;
+            introduce(experiment, &source, messages);
+            let engine = Engine::new(cores, instruction_set)?;
+            (trial::settle(experiment.clone(), &source, (&engine, interrupt), messages)?, true)
+        }
+        false => (experiment.clone(), false),
+    };
+    let experiment = &settled;
     write_experiment(&run, experiment)?;
     messages.say(&format!(
         "trains {count} networks, seeds {} to {}",
@@ -138,7 +152,7 @@ pub fn train_members(
         let (k, engine) = (index + 1, Engine::new(threads, instruction_set)?);
         let (own, place) = (experiment_of(experiment, k), folder(path, k));
         let quiet = Quiet;
-        let heard: &dyn Messages = if k == 1 { messages } else { &quiet };
+        let heard: &dyn Messages = if k == 1 && !introduced { messages } else { &quiet };
         let bar = progress(&format!("member {k}: "), own.training.epochs);
         let training = train(&own, (&place, wanted), (&engine, interrupt), bar, heard)?;
         Ok::<_, Failure>(Ended {

@@ -20,6 +20,9 @@ pub trait Progress: fmt::Debug {
     /// The network was looked at on sequences that it does not learn. Comes before the epoch that it belongs to.
     fn held_out(&mut self, _glance: &Glance) {}
 
+    /// It was found out how many epochs there will be.
+    fn expect(&mut self, _total: u64) {}
+
     /// Something worth a sentence happened to this training.
     fn say(&self, message: &str);
 

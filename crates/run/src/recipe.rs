@@ -41,6 +41,21 @@ const DECAY: f64 = 0.3;
 /// How long a movement that comes to rest is held there.
 const REST: f64 = 0.25;
 
+/// Why noisy data are not learned for longer, until that was tried.
+const UNTRIED: &str = "After more the network knows single samples by heart, and does worse on new ones.";
+
+/// Whether this is the reason for a number of epochs that a trial may better.
+pub(crate) fn leaves_open(reason: &Comment) -> bool {
+    reason.key == "training.epochs" && reason.text == UNTRIED
+}
+
+/// The most epochs that the budget allows for this experiment on `data`, taught step by step.
+pub(crate) fn most_epochs(experiment: &Experiment, data: &Dataset) -> u64 {
+    let units = experiment.network.groups.iter().map(|group| group.units).sum();
+    let batch = experiment.training.adam.as_ref().map_or(0, |adam| adam.batch_size);
+    epochs(data.total_samples() as f64, units, data.channels().len(), updates(data, batch))
+}
+
 /// An experiment of defaults alone, to be filled in.
 pub(crate) fn bare() -> Experiment {
     let text = "name = \"data\"\n[data]\n[[network.groups]]\nname = \"context\"\nunits = 1\ntime_constant = 1.0\n[training]\nepochs = 1\noptimiser = \"adam\"\n";
@@ -162,7 +177,7 @@ fn noisy(data: &Dataset, character: Character, reasons: &mut Reasons) -> (Option
     let updates = updates(data, batch);
     let most = rounded(NOISY.0.min((NOISY.1 / updates as f64).max(1.0)));
     training.epochs = epochs(data.total_samples() as f64, units, data.channels().len(), updates).min(most);
-    reasons.add("training.epochs", "After more the network knows single samples by heart, and does worse on new ones.");
+    reasons.add("training.epochs", UNTRIED);
     reasons.add("training.optimiser", "Learns sooner than the thesis' rule.");
     reasons.add("training.adam.weight_decay", "Keeps the network from learning single samples by heart.");
     training.adam = Some(Adam::with(|it| {

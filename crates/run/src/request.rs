@@ -201,14 +201,19 @@ fn alone(files: &[PathBuf], overrides: &[Override], out: Option<&Path>, resume: 
     let (chosen, source, reasons) = choose(first, (Path::new(""), None))?;
     let mut experiment =
         experiment::read_text("the experiment", &chosen.to_file(), overrides)?.resolved(Path::new(""))?;
-    let given = |key: &str| overrides.iter().any(|change| plain(&change.path) == key);
-    experiment.comments = reasons;
-    for comment in experiment.comments.iter_mut().filter(|comment| given(&comment.key)) {
-        comment.text = "Given on the command line.".to_owned();
-    }
+    experiment.comments = told_from(reasons, overrides);
     let from = format!("From {}.", listed.join(", "));
     experiment.comments.insert(0, Comment { key: "data.files".to_owned(), text: from });
     Ok(Asked::of(experiment, Some(source), out))
+}
+
+/// Reasons, but for the keys that the command line gives.
+fn told_from(mut reasons: Vec<Comment>, overrides: &[Override]) -> Vec<Comment> {
+    let given = |key: &str| overrides.iter().any(|change| plain(&change.path) == key);
+    for reason in reasons.iter_mut().filter(|reason| given(&reason.key)) {
+        reason.text = "Given on the command line.".to_owned();
+    }
+    reasons
 }
 
 /// The options that say which data are learned and how they are read: that is known before they are; what suits them, after.
@@ -295,7 +300,7 @@ fn by_recipe(
     let reasons: Vec<Comment> = reasons.into_iter().filter(|reason| !has(&reason.key)).collect();
     lay_over(&mut whole, own);
     let mut experiment = experiment::read_text(name, &text(&whole), overrides)?.resolved(folder)?;
-    experiment.comments = reasons;
+    experiment.comments = told_from(reasons, overrides);
     Ok((experiment, source))
 }
 

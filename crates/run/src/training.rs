@@ -25,6 +25,7 @@ use crate::resume;
 use crate::run_folder::{BEST, CHECKPOINT, EXPERIMENT, FILES, HISTORY, RunFolder};
 use crate::source::{self, Source};
 use crate::trained::read_checkpoint;
+use crate::trial;
 
 /// What to do with a run that is in the folder already.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -90,13 +91,21 @@ pub fn train_on(
     source: Source,
     (path, wanted): (&Path, Found),
     (engine, interrupt): (&Engine, &Interrupt),
-    progress: Box<dyn Progress>,
+    mut progress: Box<dyn Progress>,
     messages: &dyn Messages,
 ) -> Result<Training> {
     let source = held_out::split(source, experiment)?;
     if experiment.data.files.is_some() {
         introduce(experiment, &source, messages);
     }
+    // Whoever refuses a run does so at once.
+    let is_refused = wanted == Found::Refuse && path.join(CHECKPOINT).exists();
+    let settled = match is_refused {
+        true => experiment.clone(),
+        false => trial::settle(experiment.clone(), &source, (engine, interrupt), messages)?,
+    };
+    let experiment = &settled;
+    progress.expect(experiment.training.epochs);
     if !experiment.comments.is_empty() {
         messages.say(&chosen(experiment, path));
     }
@@ -202,7 +211,7 @@ fn refuse_own_input(experiment: &Experiment, run: &Path) -> Result<()> {
 }
 
 /// Says what is learned, and what looks wrong in it, before anything is learned.
-fn introduce(experiment: &Experiment, source: &Source, messages: &dyn Messages) {
+pub(crate) fn introduce(experiment: &Experiment, source: &Source, messages: &dyn Messages) {
     let data = &source.data;
     let lengths = || data.sequences().iter().map(|sequence| sequence.len());
     let (shortest, longest) = (lengths().min().unwrap_or(0), lengths().max().unwrap_or(0));
