@@ -9,6 +9,7 @@ begins with `$ ` is a command for bash, and what follows is what it prints on bo
 
 - `...` within a line stands for anything, times and facts about the machine above all.
 - A line that is `...` alone stands for any lines, or none.
+- Of a training's lines of progress only the last one is compared: how many there are depends on the machine.
 
 Comments before a block or a picture tell the rest:
 
@@ -16,7 +17,7 @@ Comments before a block or a picture tell the rest:
     <!-- check: fails 2 -->           the block's last command ends with this code
     <!-- check: file NAME -->         the block is the content of a file
     <!-- check: run COMMAND -->       run before what follows, and not shown
-    <!-- check: from PAGE -->         this page goes on in the folder of another one, which is run first
+    <!-- check: from PAGE -->         this page goes on in a copy of another one's folder, which is run first
     <!-- check: picture FILE -->      the picture below is this file of the folder; FILE.html#2 is the second drawing of a page
     <!-- check: copy FILE -->         the picture below is a copy of this file of the sources
     <!-- check: table of keys -->     what stands from here to `<!-- check: end -->` is made from `scrnn schema`
@@ -47,7 +48,12 @@ CHANGES = [
     (re.compile(r"(?<=  )[\d.,]+ (k )?epochs/s.*"), "..."),
     (re.compile(r"(?<=instruction set: )\w+"), "..."),
     (re.compile(r"(?<=instruction set )\w+(?=\))"), "..."),
+    # Milliseconds of what follows a stream.
+    (re.compile(r"(?<=  )(\d+ %|-)( +)[\d.]+ +[\d.]+ +[\d.]+$"), r"\1\2..."),
+    (re.compile(r"^[\d.]+ ms a sample.*"), "... ms a sample, ..."),
 ]
+#: A line of progress, which comes every few seconds; only that of the last epoch is compared.
+PROGRESS = re.compile(r"(?:\S+ )?epoch (\d+)/(\d+)  ")
 DIRECTIVE = re.compile(r"<!-- check: (.*?) -->")
 
 
@@ -56,7 +62,10 @@ def wrapped(output):
     lines = []
     for line in output.splitlines():
         line = line.split("\r")[-1].rstrip()
-        is_prose = len(line) > WIDTH and not re.search(r"\S {2,}\S", line)
+        progress = PROGRESS.match(line)
+        if progress and progress[1] != progress[2]:
+            continue
+        is_prose = len(line) > WIDTH and line.count(" ") > 8 and not re.search(r"\S {2,}\S", line)
         parts = textwrap.wrap(line, WIDTH, break_long_words=False, break_on_hyphens=False) if is_prose else [line]
         lines += parts or [""]
     while lines and not lines[-1]:
@@ -101,12 +110,13 @@ class Failed(Exception):
 class Place:
     """A folder in which a page's commands run."""
 
-    def __init__(self, program):
+    def __init__(self, program, origin=None):
         self.folder = Path(tempfile.mkdtemp(prefix="scrnn-book-", dir="/tmp" if os.path.isdir("/tmp") else None))
-        shutil.copytree(HERE / "data", self.folder / "work")
+        shutil.copytree(origin.work if origin else HERE / "data", self.folder / "work", symlinks=True)
         (self.folder / "bin").mkdir()
         (self.folder / "bin" / "scrnn").symlink_to(program)
-        (self.folder / "work" / "assets").symlink_to(HERE.parents[1] / "assets")
+        if not origin:
+            (self.folder / "work" / "assets").symlink_to(HERE.parents[1] / "assets")
         kept = {key: value for key, value in os.environ.items() if not key.startswith("SCRNN_")}
         self.environment = kept | {
             "PATH": f"{self.folder / 'bin'}:{os.environ['PATH']}",
@@ -212,7 +222,8 @@ class Page:
             path.write_text("\n".join(inside) + "\n", encoding="utf-8")
         if kind != "console" or reason:
             if kind == "console":
-                self.skipped.append(f"{self.name}: {inside[0]}: {reason[0]}")
+                typed = [line for line in inside if line.startswith("$ ")]
+                self.skipped.append(f"{self.name}: {'; '.join(typed)}: {reason[0]}")
             self.keep(end + 1 - first)
             return
         self.keep()
@@ -373,7 +384,7 @@ def main():
     places, problems, skipped, count, begun = {}, [], [], 0, time.monotonic()
     try:
         for name in (one for one in pages() if one in chosen):
-            places[name] = places[origin(name)] if origin(name) else Place(Path(program).resolve())
+            places[name] = Place(Path(program).resolve(), places.get(origin(name)))
             page, start = Page(name, places[name], options.update), time.monotonic()
             try:
                 page.check()
@@ -385,7 +396,7 @@ def main():
             if page.count:
                 print(f"{name}: {page.count} commands and pictures, {time.monotonic() - start:.1f} s", flush=True)
     finally:
-        for place in set(places.values()):
+        for place in places.values():
             place.remove()
     for one in skipped:
         print(f"not run: {one}")
