@@ -338,6 +338,16 @@ def pages():
     return re.findall(r"\]\(([^)]+\.md)\)", (PAGES / "SUMMARY.md").read_text(encoding="utf-8"))
 
 
+def left_out():
+    """Pages and documents that the book does not have."""
+    known = pages()
+    strangers = [f"src/{path.name} is not in SUMMARY.md" for path in PAGES.glob("*.md") if path.name not in [*known, "SUMMARY.md"]]
+    texts = "".join((PAGES / name).read_text(encoding="utf-8") for name in known)
+    return strangers + [
+        f"docs/{path.name} is on no page" for path in HERE.parent.glob("*.md") if f"{{{{#include ../../{path.name}}}}}" not in texts
+    ]
+
+
 def origin(name):
     """The page in whose folder this one goes on."""
     found = re.search(r"<!-- check: from (\S+) -->", (PAGES / name).read_text(encoding="utf-8"))
@@ -381,7 +391,7 @@ def main():
     chosen = set(options.pages or pages())
     while more := {origin(name) for name in chosen} - chosen - {None}:
         chosen |= more
-    places, problems, skipped, count, begun = {}, [], [], 0, time.monotonic()
+    places, problems, skipped, count, begun = {}, left_out(), [], 0, time.monotonic()
     try:
         for name in (one for one in pages() if one in chosen):
             places[name] = Place(Path(program).resolve(), places.get(origin(name)))

@@ -12,13 +12,13 @@ import sys
 LINK = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)\s]+)\)")
 
 
-def plain(text, known):
-    """`text` of a page with its links to files that are not `known` taken out."""
+def plain(text):
+    """`text` of a page with its links to files outside taken out."""
 
     def replaced(link):
         words, target = link.groups()
         path = target.split("#")[0]
-        if "://" in target or not path or posixpath.normpath(path) in known:
+        if not posixpath.normpath(path).startswith("../"):
             return link.group(0)
         name = posixpath.normpath(path).removeprefix("../../../").removeprefix("../../").removeprefix("../")
         return words if name in words else f"{words} (`{name}`)"
@@ -38,10 +38,8 @@ def main():
     if sys.argv[1:2] == ["supports"]:
         return
     _, book = json.load(sys.stdin)
-    items = book.get("items", book.get("sections"))
-    known = {chapter["path"] for chapter in chapters(items) if chapter["path"]}
-    for chapter in chapters(items):
-        chapter["content"] = plain(chapter["content"], known)
+    for chapter in chapters(book["items"]):
+        chapter["content"] = plain(chapter["content"])
     json.dump(book, sys.stdout)
 
 
