@@ -268,7 +268,12 @@ class Page:
         if code:
             raise Failed(output)
         end = next(index for index in range(self.at, len(self.lines)) if self.lines[index].strip() == "<!-- check: end -->")
-        made = ["", *keys(json.loads(output)), ""]
+        schema = json.loads(output)
+        made = ["", *keys(schema), ""]
+        by_hand = (PAGES / "experiment.md").read_text(encoding="utf-8")
+        names = {name for part in [schema, *schema["$defs"].values()] for name in part.get("properties", {})}
+        for name in sorted(name for name in names if not re.search(rf"\b{name}\b", by_hand)):
+            self.problems.append(f"experiment.md: the key {name} is not explained")
         if self.update:
             self.written += made
         elif self.lines[self.at : end] != made:
