@@ -202,9 +202,24 @@ class Page:
                     self.problems.append(f"{self.name}: line {self.at + 1}: nothing follows `check: {pending[-1]}`")
                     pending = []
                 self.keep()
+        if self.name == "help.md":
+            self.helps()
         after = "\n".join(self.written) + "\n"
         if self.update and after != before:
             self.path.write_text(after, encoding="utf-8")
+
+    def helps(self):
+        """Asks that every command has its help on this page, and a section among the commands."""
+        by_hand = re.findall(r"^## (.*)", (PAGES / "commands.md").read_text(encoding="utf-8"), re.MULTILINE)
+        waiting = list(subcommands(self.place, "scrnn"))
+        while waiting:
+            command = waiting.pop(0)
+            if more := subcommands(self.place, command):
+                waiting += more
+            elif f"$ {command} --help" not in self.written:
+                self.problems.append(f"{self.name}: there is no help of `{command}`: add a block with `$ {command} --help`")
+            if command.count(" ") == 1 and not any(command in heading for heading in by_hand):
+                self.problems.append(f"commands.md: there is no section about `{command}`")
 
     def keep(self, count=1):
         self.written += self.lines[self.at : self.at + count]
@@ -282,6 +297,14 @@ class Page:
         self.count += 1
         self.at = end
         self.keep()
+
+
+def subcommands(place, command):
+    """The commands below a command, as its help lists them."""
+    _, output = place.run(f"{command} --help")
+    listed = re.search(r"^Commands:\n(.*?)\n\n", output, re.DOTALL | re.MULTILINE)
+    names = re.findall(r"^  ([a-z]\S*)  ", listed[1], re.MULTILINE) if listed else []
+    return [f"{command} {name}" for name in names if name != "help"]
 
 
 def keys(schema):
