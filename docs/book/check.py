@@ -117,7 +117,8 @@ class Place:
         (self.folder / "bin" / "scrnn").symlink_to(program)
         if not origin:
             (self.folder / "work" / "assets").symlink_to(HERE.parents[1] / "assets")
-        kept = {key: value for key, value in os.environ.items() if not key.startswith("SCRNN_")}
+        # How wide a terminal is would move the ends of lines.
+        kept = {key: value for key, value in os.environ.items() if not key.startswith(("SCRNN_", "COLUMNS", "LINES"))}
         self.environment = kept | {
             "PATH": f"{self.folder / 'bin'}:{os.environ['PATH']}",
             "LC_ALL": "C.UTF-8",
