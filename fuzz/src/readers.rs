@@ -6,12 +6,18 @@ use std::path::Path;
 use std::sync::LazyLock;
 
 use scrnn::checkpoint::Checkpoint;
-use scrnn::dataset::Dataset;
+use scrnn::dataset::{Dataset, Sequence};
 use scrnn_data::{FileError, Selection, parse_as, read_part};
 use scrnn_run::experiment::{self, Override};
 use scrnn_run::notes::Notes;
 use scrnn_run::stream::{Arrival, Stream};
 use scrnn_run::{history, resume};
+
+/// What an experiment's network may be for.
+static TWO_CHANNELS: LazyLock<Dataset> = LazyLock::new(|| {
+    let sequence = Sequence::new("1", 2, vec![0.0, 1.0, 0.5, -1.0, 0.0, 1.0]).expect("three samples");
+    Dataset::new(Dataset::numbered_channels(2), vec![sequence]).expect("a data set")
+});
 
 /// A data file of this name. With `resampled`, a recording's joints every twentieth of a second.
 pub fn data(name: &str, bytes: &[u8], resampled: bool) {
@@ -43,7 +49,7 @@ pub fn experiment(text: &str) {
         Ok(resolved) => {
             let again = toml::to_string(&resolved).expect("what was read can be written");
             assert!(experiment::read_text("again.toml", &again, &[]).is_ok(), "{again}");
-            let _ = (resolved.plan(), resolved.topology(2));
+            let _ = (resolved.plan(), resolved.topology(&TWO_CHANNELS));
         }
         Err(failure) => show(text.as_bytes(), failure),
     }
@@ -97,7 +103,7 @@ pub fn notes(bytes: &[u8]) {
     let crafted = Checkpoint { notes: value, ..GOLDEN.clone() };
     if let Some(notes) = Notes::of(&crafted) {
         if let Ok(experiment) = notes.experiment() {
-            let _ = (experiment.data.selection(), experiment.plan(), experiment.topology(2));
+            let _ = (experiment.data.selection(), experiment.plan(), experiment.topology(&TWO_CHANNELS));
         }
         assert_eq!(Notes::of(&Checkpoint { notes: notes.to_value(), ..GOLDEN.clone() }), Some(notes));
     }

@@ -242,6 +242,31 @@ def hdf5(folder):
         file["rewards"] = np.zeros(12)
         file["terminals"] = np.arange(12) == 3
         file["timeouts"] = np.arange(12) == 9
+    # Three recordings of a day each, some way down.
+    with h5py.File(folder / "dates.h5", "w") as file:
+        for e, day in enumerate(["2024-01-30", "2024-01-31", "2024-02-01"]):
+            file[f"recordings/{day}/arm/q"] = state(e, 8)
+            file[f"recordings/{day}/arm/names"] = np.array(JOINTS, dtype="S8")
+    # Joints side by side, each in a group of its own.
+    with h5py.File(folder / "joints.h5", "w") as file:
+        for c in range(3):
+            file[f"arm/joint_{c}/position"] = state(0, 8)[:, c]
+    # A state more than actions, as simulators write it.
+    with h5py.File(folder / "one_more.h5", "w") as file:
+        for e in range(3):
+            file[f"traj_{e}/obs/agent/qpos"] = state(e, 7 + e)
+            file[f"traj_{e}/actions"] = -state(e, 6 + e)
+    # Points in space: steps x points x 3.
+    with h5py.File(folder / "points.h5", "w") as file:
+        t, c = np.arange(40)[:, None], np.arange(12)[None, :]
+        file["pose"] = (100 * ((7 * c) % 12) + np.sin(t / 5 + c)).reshape(40, 4, 3).astype(np.float32)
+    # How pandas' to_hdf lays out a table (its default format).
+    with h5py.File(folder / "pandas.h5", "w") as file:
+        table = file.create_group("df")
+        table["axis0"] = np.array(JOINTS, dtype="S8")
+        table["axis1"] = np.arange(9)
+        table["block0_items"] = np.array(JOINTS, dtype="S8")
+        table["block0_values"] = state(0, 9, kind=np.float64)
     with h5py.File(folder / "matlab.mat", "w", userblock_size=512) as file:
         file["q"] = state(0, 20, kind=np.float64).T
         file["q"].attrs["MATLAB_class"] = np.bytes_("double")

@@ -18,7 +18,7 @@ use crate::budget::{Budget, OverBudget};
 use crate::natural::natural;
 use crate::reading::Topic;
 use crate::remark::Remark;
-use crate::samples::{Samples, Track};
+use crate::samples::{Samples, Track, split_off};
 use crate::{ArrayProblem, Axes, FileError, Selection, npz, times};
 
 /// Numbers with a shape. NaN is missing.
@@ -112,6 +112,17 @@ pub fn to_samples(
         None => true,
     });
     arrays.iter_mut().for_each(squeeze);
+    // Images beside a robot's state.
+    let (deep, flat): (Vec<_>, Vec<_>) = arrays.into_iter().partition(|array| array.shape.len() > 3);
+    arrays = flat;
+    if arrays.is_empty() || !selection.arrays.is_empty() {
+        arrays.extend(deep);
+    } else {
+        remarks.extend(deep.into_iter().map(|array| {
+            let what = format!("an array of {} axes, as images have", array.shape.len());
+            Remark::LeftOut { column: array.name, what }
+        }));
+    }
     let (clock, mut arrays) = clock(arrays);
     let mut samples = match plan(path, &arrays, selection)? {
         Plan::Alone => alone(path, arrays.remove(0), selection, texts, &mut remarks)?,
@@ -374,14 +385,13 @@ fn alone(
     let as_they_are = axes.sequences.unwrap_or(0) <= axes.steps
         && axes.channels.is_none_or(|axis| axis > axes.steps)
         && axes.sequences.is_none_or(|axis| axis < axes.steps);
-    let values = if as_they_are { values } else { reordered(&shape, axes, &values) };
-    let tracks = values.chunks_exact((steps * channels).max(1)).enumerate();
-    let tracks: Vec<(String, Vec<f64>)> = if sequences == 1 {
-        let own = shape.len() < 3 && !name.is_empty();
-        vec![(if own { name } else { "1".to_owned() }, values)]
-    } else {
-        tracks.map(|(s, values)| ((s + 1).to_string(), values.to_vec())).collect()
-    };
+    let mut values = if as_they_are { values } else { reordered(&shape, axes, &values) };
+    let own = sequences == 1 && shape.len() < 3 && !name.is_empty();
+    // From the last to the first, so that the samples are held once.
+    let mut tracks: Vec<(String, Vec<f64>)> =
+        (1..sequences).rev().map(|s| ((s + 1).to_string(), split_off(&mut values, s * steps * channels))).collect();
+    tracks.push((if own { name } else { "1".to_owned() }, values));
+    tracks.reverse();
     let of_sequences = |texts: &Texts| SEQUENCE_NAMES.contains(&texts.name.to_lowercase().as_str());
     let mut fitting =
         texts.iter().filter(|texts| texts.texts.len() == channels && distinct(&texts.texts) && !of_sequences(texts));
@@ -443,8 +453,7 @@ fn guessed(path: &str, name: &str, shape: &[usize], values: &[f64]) -> Result<Ax
         return Err(error(path, name, ArrayProblem::MoreChannels { shape: shape_text(shape), channels, steps }, help));
     }
     if let [n, t, c] = *shape
-        && n > t
-        && goes_on_along_the_first(n, t, c, values)
+        && first_is_time(n, t, c, values)
     {
         let help = format!(
             "if its {n} rows are steps, reshape it to ({n}, {}) by array.reshape(len(array), -1); if they are sequences, say `axes = \"ntc\"`",
@@ -457,7 +466,10 @@ fn guessed(path: &str, name: &str, shape: &[usize], values: &[f64]) -> Result<Ax
 
 /// Whether values go on smoothly along the first axis, and jump along the second. Steps of a movement are small beside
 /// its extent; joints beside each other are as far apart as any two values.
-fn goes_on_along_the_first(n: usize, t: usize, c: usize, values: &[f64]) -> bool {
+pub fn first_is_time(n: usize, t: usize, c: usize, values: &[f64]) -> bool {
+    if n <= t || values.len() != n * t * c {
+        return false;
+    }
     // The mean square of steps along an axis, by the variance around the mean along it.
     let roughness = |length: usize, others: &dyn Fn(usize, usize) -> usize, lines: usize| {
         let (mut steps, mut spread) = (0.0, 0.0);
@@ -494,7 +506,7 @@ fn reordered(shape: &[usize], axes: Axes, values: &[f64]) -> Vec<f64> {
 /// # Errors
 /// [`OverBudget`]: a long name may stand for thousands of channels, and each of them has it in its own.
 fn groups(
-    arrays: Vec<Array>,
+    mut arrays: Vec<Array>,
     sequences: Vec<(String, Vec<usize>)>,
     budget: &Budget,
     remarks: &mut Vec<Remark>,
@@ -535,6 +547,7 @@ fn groups(
                 values.extend(&arrays[index].values[step * width..(step + 1) * width]);
             }
         }
+        group.iter().for_each(|&index| arrays[index].values = Vec::new());
         tracks.push(Track { name, values, times: Vec::new() });
     }
     let sequences = tracks.into_iter().map(|track| (track.name, track.values)).collect();

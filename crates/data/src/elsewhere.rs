@@ -49,6 +49,33 @@ const FORMATS: &[(&[&str], &str, &str)] = &[
         "a file of TensorFlow records",
         "in Python, with the data set's tensorflow_datasets builder, save each episode's arrays by `numpy.savez`",
     ),
+    (
+        &["jsonl", "ndjson"],
+        "a file of JSON lines, which `scrnn recognize` takes as a stream (`-`), but `train` does not",
+        "in Python: `import pandas as pd; pd.read_json(\"FILE\", lines=True).to_csv(\"STEM.csv\", index=False)`",
+    ),
+    (
+        &["json"],
+        "a JSON file",
+        "in Python, for a dictionary of lists of numbers: `import json, numpy as np; np.savez(\"STEM.npz\", **json.load(open(\"FILE\")))`; \
+         for a list of rows: `import pandas as pd; pd.read_json(\"FILE\").to_csv(\"STEM.csv\", index=False)`",
+    ),
+    (
+        &["yaml", "yml"],
+        "text in YAML",
+        "what `ros2 topic echo` prints is read as a table if it is asked for with `--csv` and kept as a .csv; a recording by `ros2 bag record` is better",
+    ),
+    (
+        &["arff"],
+        "a table of Weka",
+        "in Python: `from scipy.io import arff; import pandas as pd; pd.DataFrame(arff.loadarff(\"FILE\")[0]).to_csv(\"STEM.csv\", index=False)`",
+    ),
+    (
+        &["trc"],
+        "a file of marker tracks",
+        "in Python: `import numpy as np; a = np.genfromtxt(\"FILE\", skip_header=6, invalid_raise=False); \
+         np.savez(\"STEM.npz\", time=a[:, 1], markers=a[:, 2:])`; channels go x, y, z by marker, in the order of the file's fourth line",
+    ),
     (&["zip", "gz", "tar", "tgz", "7z", "xz", "bz2", "zst"], "packed", "unpack it first"),
 ];
 

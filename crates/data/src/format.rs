@@ -38,7 +38,7 @@ pub const FORMATS: &[Format] = &[
     },
     Format {
         name: "text table",
-        extensions: &["txt", "dat"],
+        extensions: &["txt", "dat", "mot", "sto"],
         folder: None,
         options: &["period"],
         read: table::read_csv,

@@ -57,6 +57,7 @@ pub mod suspicions;
 mod table;
 pub mod times;
 mod unpack;
+mod windows;
 
 pub use convert::{Conversion, convert, write_converted};
 pub use error::{ArrayProblem, ChannelsError, FileError, LineError, LineProblem, disk_help};

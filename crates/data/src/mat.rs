@@ -15,6 +15,7 @@ use crate::problem::FormatProblem;
 use crate::samples::Samples;
 use crate::source::Source;
 use crate::unpack::zlib_to_its_end;
+use crate::windows::Windows;
 use crate::{FileError, Remark, Selection, hdf5};
 
 const KIND: &str = "MATLAB";
@@ -30,10 +31,11 @@ fn damaged(what: &'static str) -> FormatProblem {
 /// # Errors
 /// [`FileError`].
 pub fn read(source: &Source<'_>, selection: &Selection) -> Result<Samples, FileError> {
-    let bytes = source.bytes()?;
-    if bytes.starts_with(b"MATLAB 7.3") || bytes.starts_with(b"\x89HDF") {
-        return hdf5::read(source, selection);
+    let windows = Windows::of(source)?;
+    if *windows.passing(0, 10) == *b"MATLAB 7.3" || *windows.passing(0, 4) == *b"\x89HDF" {
+        return hdf5::of_windows(windows, source, selection);
     }
+    let bytes = windows.passing(0, usize::MAX);
     let at = |problem: FormatProblem| problem.at(source.name());
     let contents = Contents::read(&bytes, source.budget()).map_err(at)?;
     if contents.arrays.is_empty() {

@@ -271,3 +271,115 @@ fn long_names_of_thousands_of_channels_are_refused() {
     let told = parse_as(Path::new("x.npy"), &npy, &arrays("tc")).unwrap_err().to_string();
     assert!(told.contains("up to 32 lengths"), "{told}");
 }
+
+/// Bytes held at a time while a file of these bytes is read from the disk, and the samples that it holds.
+fn held_on_disk(name: &str, bytes: &[u8], selection: &Selection) -> (u64, u64) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    std::fs::write(&path, bytes).unwrap();
+    let mut samples = 0;
+    let read = || {
+        let reading = inspect(&path, selection).unwrap_or_else(|error| panic!("{name}: {error}"));
+        samples =
+            reading.data.sequences().iter().map(|one| one.values().len() * size_of::<f64>()).sum::<usize>() as u64;
+    };
+    (allocation_counter::measure(read).bytes_max, samples)
+}
+
+/// An HDF5 file with one data set of steps x channels, in one stretch or in chunks of 1024 steps, one behind the other.
+fn hdf5_of(steps: usize, channels: usize, chunked: bool) -> Vec<u8> {
+    let message = |kind: u8, data: &[u8]| [&[kind, data.len() as u8, 0, 0][..], data].concat();
+    let header = |messages: &[Vec<u8>]| {
+        let all = messages.concat();
+        [&b"OHDR\x02\x02"[..], &(all.len() as u32).to_le_bytes(), &all, &[0; 4]].concat()
+    };
+    let place = |address: usize| (address as u64).to_le_bytes();
+    let undefined = u64::MAX.to_le_bytes();
+    let (root, data) = (48, 1024);
+    let link = |to: usize| message(6, &[&[1, 0, 1, b'q'][..], &place(to)].concat());
+    let root_header = header(&[link(200)]);
+    let layout = match chunked {
+        true => [&[4, 2, 0, 3, 8][..], &place(1024), &place(channels), &place(8), &[2], &place(data)].concat(),
+        false => [&[3, 1][..], &place(data), &place(steps * channels * 8)].concat(),
+    };
+    let number = [&[0x11, 0x20, 0x3f, 0, 8, 0, 0, 0, 0, 0, 64, 0, 52, 11, 0, 52][..], &1023_u32.to_le_bytes()].concat();
+    let space = [&[2, 2, 0, 1][..], &place(steps), &place(channels)].concat();
+    let set_header = header(&[message(1, &space), message(3, &number), message(8, &layout)]);
+    let mut bytes = [&b"\x89HDF\r\n\x1a\n\x02\x08\x08\0"[..], &place(0), &undefined, &undefined, &place(root)].concat();
+    for (from, header) in [(root, root_header), (200, set_header)] {
+        bytes.resize(from, 0);
+        bytes.extend(header);
+    }
+    bytes.resize(data, 0);
+    bytes.extend((0..steps * channels).flat_map(|k| ((k as f64) * 0.37).sin().to_le_bytes()));
+    // The last chunk is written in full.
+    let full = if chunked { steps.next_multiple_of(1024) } else { steps };
+    bytes.resize(data + full * channels * 8, 0);
+    bytes
+}
+
+#[test]
+fn a_file_on_the_disk_is_held_once_as_samples_and_not_as_a_file_too() {
+    let (steps, channels) = (65_536, 8);
+    let values: Vec<f64> = (0..steps * channels).map(|k| (k as f64 * 0.37).sin()).collect();
+    let data = |split: usize| {
+        let rows = values.chunks(values.len() / split).enumerate();
+        let rows = rows.map(|(s, part)| Sequence::new(s.to_string(), channels, part.to_vec()).unwrap()).collect();
+        Dataset::new(Dataset::numbered_channels(channels), rows).unwrap()
+    };
+    let (one, many) = (data(1), data(16));
+    let field = |data| [Field { name: "", data }];
+    let frames = |data: &Dataset| {
+        let files = lerobot::write::files("x", data, Some(0.02), "move").unwrap();
+        files.into_iter().find(|(place, _)| place.starts_with("data/")).unwrap().1
+    };
+    let columns = npy::array_bytes(&[steps, channels], values.iter().copied());
+    let turned = String::from_utf8_lossy(&columns[..128]).into_owned();
+    let at = turned.find("False").unwrap();
+    let mut fortran = columns;
+    // At its place in bytes: the magic begins with one that is no UTF-8, which became three.
+    fortran[at - 2..at + 3].copy_from_slice(b"True ");
+    let half = |from: usize| values.chunks_exact(channels).flat_map(move |row| row[from..from + 4].to_vec());
+    let groups = super::tests::archive(&[
+        ("qpos.npy", npy::array_bytes(&[steps, 4], half(0))),
+        ("action.npy", npy::array_bytes(&[steps, 4], half(4))),
+    ]);
+    // What is held at most, as a share of the samples. Where one array is cut into sequences, what is left of it is made
+    // shorter: a system does that in its place, the allocator of this test copies.
+    for (name, bytes, share) in [
+        ("x.npy", npy::write("x.npy", &field(&one)).unwrap(), 1.1),
+        ("x.npy", npy::write("x.npy", &field(&many)).unwrap(), 2.1),
+        ("x.npy", fortran, 1.1),
+        ("x.npz", npz::write("x.npz", &field(&many)).unwrap(), 1.1),
+        ("x.npz", groups, 2.1),
+        ("x.h5", hdf5_of(steps, channels, false), 1.5),
+        ("x.h5", hdf5_of(steps, channels, true), 1.1),
+        ("x.parquet", frames(&one), 1.6),
+        ("x.parquet", frames(&many), 1.5),
+    ] {
+        let (held, samples) = held_on_disk(name, &bytes, &Selection::default());
+        assert_eq!(samples, (values.len() * 8) as u64, "{name}");
+        assert!(held as f64 <= share * samples as f64 + FREE as f64, "{name}: {held} for {samples}, allowed {share}");
+    }
+}
+
+#[test]
+fn what_is_read_in_windows_is_what_stands_there() {
+    for chunked in [false, true] {
+        let bytes = hdf5_of(5000, 3, chunked);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.h5");
+        std::fs::write(&path, &bytes).unwrap();
+        let selection = Selection::default();
+        let (on_disk, in_memory) =
+            (inspect(&path, &selection).unwrap(), inspect_bytes(&path, &bytes, &selection).unwrap());
+        assert_eq!(on_disk.data, in_memory.data);
+        let values = on_disk.data.sequences()[0].values();
+        assert_eq!((values.len(), values[14_999]), (15_000, (14_999.0_f64 * 0.37).sin()));
+        // Cut anywhere, it is refused.
+        for length in (0..1100).step_by(13).chain([bytes.len() - 1]) {
+            std::fs::write(&path, &bytes[..length]).unwrap();
+            assert!(inspect(&path, &selection).is_err(), "{length}");
+        }
+    }
+}

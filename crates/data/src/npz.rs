@@ -4,7 +4,7 @@
 //! archive could unpack to anything.
 
 use std::collections::HashSet;
-use std::io::{Cursor, Read, Write};
+use std::io::{BufReader, Cursor, Write};
 
 use zip::result::ZipError;
 use zip::write::SimpleFileOptions;
@@ -12,20 +12,29 @@ use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
 use scrnn::dataset::Dataset;
 
-use super::npy::{Contents, array_bytes, file_error, parse, text_bytes};
+use super::npy::{Contents, Length, Refused, array_bytes, file_error, parse, text_bytes};
 use crate::arrays::{Texts, to_samples};
 use crate::excerpt::shortened;
 use crate::remark::Remark;
 use crate::samples::Samples;
-use crate::source::Source;
+use crate::source::{ReadSeek, Source};
 use crate::{ArrayProblem, Field, FileError, Selection};
 
 /// Reads the file called `path`.
 pub fn read(source: &Source<'_>, selection: &Selection) -> Result<Samples, FileError> {
-    let (path, bytes, budget) = (source.name(), source.bytes()?, source.budget());
+    let (path, budget) = (source.name(), source.budget());
+    // Member by member; what is no file on the disk is read as a whole.
+    let (reader, length): (Box<dyn ReadSeek + '_>, u64) = match source.file()? {
+        Some((file, length)) => (Box::new(BufReader::new(file)), length),
+        None => {
+            let bytes = source.bytes()?;
+            let length = bytes.len() as u64;
+            (Box::new(Cursor::new(bytes)), length)
+        }
+    };
     let broken = |source| FileError::Archive { path: path.to_owned(), source };
     let over = |problem| FileError::OverBudget { path: path.to_owned(), problem };
-    let mut archive = ZipArchive::new(Cursor::new(&*bytes)).map_err(broken)?;
+    let mut archive = ZipArchive::new(reader).map_err(broken)?;
     let packed = archive.len() as u64;
     budget.take(archive.len().saturating_mul(256)).map_err(over)?;
     let (mut arrays, mut texts, mut remarks) = (Vec::new(), Vec::new(), Vec::new());
@@ -34,7 +43,7 @@ pub fn read(source: &Source<'_>, selection: &Selection) -> Result<Samples, FileE
     for index in 0..archive.len() {
         let mut member = archive.by_index(index).map_err(broken)?;
         spent = spent.saturating_add(member.compressed_size());
-        if spent > bytes.len() as u64 || !starts.insert(member.header_start()) {
+        if spent > length || !starts.insert(member.header_start()) {
             return Err(FileError::Overlap { path: path.to_owned() });
         }
         let file_name = member.name().map_err(broken)?.into_owned();
@@ -43,15 +52,12 @@ pub fn read(source: &Source<'_>, selection: &Selection) -> Result<Samples, FileE
         if hidden || member.is_dir() {
             continue;
         }
-        let mut contents = Vec::new();
-        // One byte more shows that there is more.
-        let left = budget.left();
-        member.by_ref().take(left + 1).read_to_end(&mut contents).map_err(|error| broken(ZipError::Io(error)))?;
-        budget.take(contents.len()).map_err(over)?;
+        // Deflate packs to a thousandth at most.
+        let most = Length::AtMost(member.compressed_size().saturating_mul(1040).saturating_add(1 << 10));
         let name = file_name.strip_suffix(".npy").unwrap_or(&file_name).to_owned();
         let place = format!("{path}, array `{}`", shortened(&file_name));
         let named = file_name.len() > name.len();
-        match parse(&contents, budget) {
+        match parse(&mut member, most, budget) {
             Ok(Contents::Arrays(parts)) if parts.len() == 1 && parts[0].name.is_empty() => {
                 arrays.extend(parts.into_iter().map(|array| crate::arrays::Array { name: name.clone(), ..array }));
             }
@@ -67,13 +73,13 @@ pub fn read(source: &Source<'_>, selection: &Selection) -> Result<Samples, FileE
                 remarks.push(Remark::LeftOut { column: name, what: format!("elements of type {found}") });
                 objects.get_or_insert((place, found));
             }
+            Err(Refused::Unread(error)) => return Err(broken(ZipError::Io(error))),
             Err(_) if !named => {
                 remarks.push(Remark::LeftOut { column: shortened(&file_name), what: "no array".to_owned() });
                 not_numpy.get_or_insert(place);
             }
             Err(refused) => return Err(file_error(path, &place, refused)),
         }
-        budget.give_back(contents.len());
     }
     if arrays.is_empty() {
         return Err(match (objects, not_numpy) {

@@ -39,6 +39,17 @@ pub struct Track {
     pub times: Vec<i64>,
 }
 
+/// Takes what stands from a place on out of a list, which gives its room back: where many sequences are cut from one list, the
+/// samples are held once.
+pub fn split_off(values: &mut Vec<f64>, from: usize) -> Vec<f64> {
+    let rest = values.split_off(from.min(values.len()));
+    // Not each time: where the system copies, that would be for each sequence all that is left.
+    if values.capacity() - values.len() > values.capacity() / 16 {
+        values.shrink_to_fit();
+    }
+    rest
+}
+
 impl Samples {
     /// Sequences without times, on channels `y1`, `y2`, ...
     #[must_use]

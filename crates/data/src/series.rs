@@ -191,6 +191,41 @@ mod tests {
         assert_eq!(reading.data.sequences()[0].name, "1");
     }
 
+    /// What tests/python/write_series.py wrote with sktime.
+    #[test]
+    fn what_sktime_writes_is_read() {
+        for (name, text) in [
+            ("panel", include_str!("../tests/fixtures/series/panel.ts")),
+            ("array", include_str!("../tests/fixtures/series/array.ts")),
+        ] {
+            assert!(text.starts_with("# Written by sktime"), "{name}");
+            let reading = read(text).unwrap();
+            let names: Vec<&str> = reading.data.sequences().iter().map(|one| one.name.as_str()).collect();
+            assert_eq!(names, ["1 wave", "2 rest", "3 wave"], "{name}");
+            for (e, sequence) in reading.data.sequences().iter().enumerate() {
+                assert_eq!(sequence.len(), 6, "{name}");
+                for t in 0..6 {
+                    let expected = [0.0, 1.0].map(|c| 16.0 * e as f64 + t as f64 / 4.0 + c / 32.0);
+                    let missing = name == "array" && (e, t) == (1, 2);
+                    assert_eq!(sequence.sample(t)[1], expected[1], "{name}");
+                    assert!(
+                        sequence.sample(t)[0] == expected[0] || missing && sequence.sample(t)[0].is_nan(),
+                        "{name}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn times_at_the_end_of_all_numbers_are_refused_and_overflow_nothing() {
+        for times in ["1,16666666666666666,20.5", "-9e9,9e9,-9e9", "9.2e9,-9.2e9,9.2e9", "0,1e300,2e300"] {
+            let rows: Vec<String> = times.split(',').map(|time| format!("({time},1)")).collect();
+            let error = read(&format!("@timeStamps true\n@classLabel false\n@data\n{}\n", rows.join(",")));
+            assert!(error.is_err() || times.contains("1e300"), "{times}");
+        }
+    }
+
     #[test]
     fn what_is_wrong_is_said_with_its_line() {
         let says = |text: &str, part: &str| {

@@ -98,6 +98,20 @@ impl<'a> Source<'a> {
         }
     }
 
+    /// The file on the disk and its bytes' number, if that is what it is: not bytes that were given, a pipe or a device.
+    ///
+    /// # Errors
+    /// [`FileError::Disk`].
+    pub fn file(&self) -> Result<Option<(std::fs::File, u64)>, FileError> {
+        let disk = |source| FileError::disk("read", self.path, source);
+        if self.bytes.is_some() || !std::fs::metadata(self.path).map_err(disk)?.is_file() {
+            return Ok(None);
+        }
+        let file = std::fs::File::open(self.path).map_err(disk)?;
+        let length = file.metadata().map_err(disk)?.len();
+        Ok(Some((file, length)))
+    }
+
     /// The file, to be read piece by piece.
     ///
     /// # Errors

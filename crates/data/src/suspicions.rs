@@ -55,6 +55,16 @@ pub enum Suspicion {
         /// The range with them, over the range without.
         times: f64,
     },
+    /// One value far from all others comes again and again: it may stand for a missing one.
+    #[error("channel {channel} is {value} in {count} samples, far from all others: it may stand for missing ones")]
+    Mark {
+        /// The channel.
+        channel: String,
+        /// The value.
+        value: f64,
+        /// How many samples.
+        count: usize,
+    },
     /// An angle jumps by a whole turn.
     #[error("channel {channel} jumps by a whole turn (sequence {sequence}, step {step}; {count} jumps)")]
     Turns {
@@ -121,6 +131,7 @@ impl Suspicion {
             }
             Self::HardlyMoves { size, .. } => format!("take {size} off, or leave it out by `channels = [...]`"),
             Self::Spikes { .. } => "mend them, make them missing, or scale by `scaling = \"robust\"`".to_owned(),
+            Self::Mark { .. } => "leave these cells empty, or write NaN: what is missing is learned around".to_owned(),
             Self::Turns { channel, .. } => {
                 format!("`unwrap = [\"{channel}\"]` takes the jumps out; its sine and cosine never jump")
             }
@@ -150,7 +161,7 @@ pub fn look(data: &Dataset) -> Vec<Suspicion> {
             .or_else(|| even_steps(&series, channel).filter(|_| turned.is_none()))
             .or_else(|| hardly_moves(&series, channel));
         found.extend(one);
-        found.extend(spikes(&series, channel));
+        found.extend(spikes(&series, channel).or_else(|| mark(&series, channel)));
         found.extend(turned);
         found.extend(staircase(&series, channel));
     }
@@ -289,6 +300,38 @@ fn spikes(series: &Series<'_>, channel: &str) -> Option<Suspicion> {
         step,
         value,
         times: (greatest - least) / inner,
+    })
+}
+
+/// How many times the range of all others a mark lies outside of it, how large it is at least (-99, -999, 9999, 65535), and
+/// how often it comes.
+const MARK_DISTANCE: f64 = 3.0;
+const LEAST_MARK: f64 = 99.0;
+const FEWEST_MARKS: usize = 3;
+
+/// The least or the greatest value, if it is a large whole number that comes again and again, and nothing else is near it.
+fn mark(series: &Series<'_>, channel: &str) -> Option<Suspicion> {
+    let (least, greatest) = series.bounds()?;
+    [least, greatest].into_iter().find_map(|value| {
+        if value.abs() < LEAST_MARK || value.fract() != 0.0 {
+            return None;
+        }
+        let (mut count, mut all, mut runs, mut before) = (0, 0, 0, f64::NAN);
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for other in series.values() {
+            all += 1;
+            if other == value {
+                count += 1;
+                runs += usize::from(before != value);
+            } else {
+                (low, high) = (low.min(other), high.max(other));
+            }
+            before = other;
+        }
+        let away = (low - value).max(value - high);
+        // An on-off signal has no range beside it.
+        (all >= FEWEST_SAMPLES && runs >= FEWEST_MARKS && high > low && away > MARK_DISTANCE * (high - low))
+            .then(|| Suspicion::Mark { channel: channel.to_owned(), value, count })
     })
 }
 
@@ -534,6 +577,24 @@ mod tests {
         // As often as that it is part of what is recorded.
         (0..1000).step_by(20).for_each(|k| values[k] = 60.0);
         assert_eq!(look(&set(&[values])), []);
+    }
+
+    #[test]
+    fn values_that_stand_for_missing_ones_are_seen() {
+        let mut values = sine(200);
+        for at in [3, 40, 41, 42, 43, 44, 120, 199] {
+            values[at] = -9999.0;
+        }
+        let found = look(&set(&[values.clone()]));
+        assert_eq!(found, [Suspicion::Mark { channel: "y1".into(), value: -9999.0, count: 8 }]);
+        assert!(found[0].help().unwrap().contains("NaN"));
+        // A gripper that is shut or open, and a movement that rests at its end.
+        let gripper: Vec<f64> = (0..200).map(|k| if k % 50 < 25 { 0.0 } else { 1000.0 }).collect();
+        let rests: Vec<f64> = sine(200).iter().map(|value| value.max(-0.5)).collect();
+        for quiet in [gripper, rests] {
+            let found = look(&set(&[quiet]));
+            assert!(!found.iter().any(|one| matches!(one, Suspicion::Mark { .. })), "{found:?}");
+        }
     }
 
     #[test]

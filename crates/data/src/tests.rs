@@ -126,6 +126,21 @@ pub fn archive(members: &[(&str, Vec<u8>)]) -> Vec<u8> {
 }
 
 #[test]
+fn images_in_an_archive_are_left_out_beside_numbers() {
+    let array = |lengths: &[usize]| npy::array_bytes(lengths, (0..lengths.iter().product()).map(|k: usize| k as f64));
+    let bytes = archive(&[("qpos.npy", array(&[5, 2])), ("images.npy", array(&[5, 2, 2, 3]))]);
+    let reading = inspect_bytes(Path::new("x.npz"), &bytes, &Selection::default()).unwrap();
+    assert_eq!(reading.data.sequences()[0].values(), (0..10).map(f64::from).collect::<Vec<_>>());
+    let said: Vec<String> = reading.remarks.iter().map(ToString::to_string).collect();
+    assert!(said.iter().any(|one| one.contains("`images`") && one.contains("4 axes")), "{said:?}");
+    // Asked for, they are refused with what to do; alone, too.
+    let asked = Selection { arrays: vec!["images".into()], ..Selection::default() };
+    assert!(matches!(inspect_bytes(Path::new("x.npz"), &bytes, &asked), Err(FileError::Array { .. })));
+    let alone = archive(&[("images.npy", array(&[5, 2, 2, 3]))]);
+    assert!(inspect_bytes(Path::new("x.npz"), &alone, &Selection::default()).is_err());
+}
+
+#[test]
 fn the_arrays_of_an_archive_are_its_sequences() {
     let rows = |lengths: &[usize]| npy::array_bytes(lengths, (0..lengths.iter().product()).map(|k: usize| k as f64));
     let read = |members: &[(&str, Vec<u8>)]| parse_as(Path::new("x.npz"), &archive(members), &Selection::default());

@@ -91,8 +91,9 @@ pub fn to_even_steps(path: &str, samples: &mut Samples, selection: &Selection) -
         return Ok(Some(period as f64 / 1e9));
     }
     let Some((first, middle)) = middles.first().cloned() else { return Ok(samples.period) };
-    if let Some((other, differs)) =
-        middles.iter().find(|(_, other)| off(*other, middle) > EVEN && (*other - middle).abs() > resolution)
+    if let Some((other, differs)) = middles
+        .iter()
+        .find(|(_, other)| off(*other, middle) > EVEN && other.abs_diff(middle) > resolution.unsigned_abs())
     {
         let found =
             format!("samples of {first} are {} s apart, those of {other} {} s", seconds(middle), seconds(*differs));
@@ -107,8 +108,8 @@ pub fn to_even_steps(path: &str, samples: &mut Samples, selection: &Selection) -
 fn help(middle: i64) -> String {
     // Three digits of a jittering clock are enough, as long as they say the same.
     let digits = (middle.max(1) as f64).log10().floor() as i32 - 2;
-    let unit = 10_i64.pow(digits.clamp(0, 16) as u32);
-    let rounded = (middle + unit / 2) / unit * unit;
+    let unit = 10_i128.pow(digits.clamp(0, 16) as u32);
+    let rounded = i64::try_from((i128::from(middle) + unit / 2) / unit * unit).unwrap_or(middle);
     let period = seconds(if off(rounded, middle) < 0.01 { rounded.max(1) } else { middle.max(1) });
     format!("`period = {period}` brings them to even times; `time = \"rows\"` takes them as even steps all the same")
 }
@@ -161,7 +162,7 @@ fn is_rounding(times: &[i64], middle: i64, resolution: i64) -> bool {
     let near = |k: usize, time: i64| (time as f64 - first as f64 - k as f64 * mean).abs() <= 1.001 * resolution as f64;
     let intervals = || times.windows(2).map(|pair| pair[1].saturating_sub(pair[0]));
     let off_count = intervals().filter(|&interval| off(interval, middle) > EVEN).count();
-    let by_digits = intervals().all(|interval| (interval - middle).abs() <= resolution);
+    let by_digits = intervals().all(|interval| interval.abs_diff(middle) <= resolution.unsigned_abs());
     mean > 0.0
         && by_digits
         && off_count as f64 >= 0.05 * steps

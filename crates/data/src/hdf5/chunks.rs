@@ -169,11 +169,11 @@ impl Grid {
         let Some(block) = block else { return Ok(()) };
         let order = self.order(None)?;
         let page = 1_usize.checked_shl(page_bits).ok_or_else(broken)?;
-        let mut front = file.signed(block, b"FADB")?;
-        front.take(2 + file.offsets).ok_or_else(broken)?;
         if entry < file.offsets {
             return Err(broken());
         }
+        let mut front = file.signed_front(block, b"FADB", block_size(count, page, entry))?;
+        front.take(2 + file.offsets).ok_or_else(broken)?;
         if count <= page {
             let entries = count.checked_mul(entry).and_then(|size| front.take(size)).ok_or_else(broken)?;
             return self.entries(file, entries, entry, &order, 0, each);
@@ -230,7 +230,8 @@ impl Grid {
         if blocks.entry < file.offsets || !least.is_power_of_two() || !pointers.is_power_of_two() || bits > 64 {
             return Err(broken());
         }
-        let mut front = file.signed(block, b"EAIB")?;
+        // Some hundred pointers at most.
+        let mut front = file.signed_front(block, b"EAIB", usize::from(in_index) * blocks.entry + (1 << 13))?;
         front.take(2 + file.offsets).ok_or_else(broken)?;
         let entries = front.take(usize::from(in_index) * blocks.entry).ok_or_else(broken)?;
         self.entries(file, entries, blocks.entry, &blocks.order, 0, each)?;
@@ -272,9 +273,10 @@ impl Grid {
         first: u64,
         each: Each<'_>,
     ) -> Result<(), FormatProblem> {
-        let mut front = file.signed(address, b"EASB")?;
-        front.take(2 + file.offsets + blocks.offset).ok_or_else(broken)?;
         let bitmap = if length > blocks.page { length.div_ceil(blocks.page).div_ceil(8) } else { 0 };
+        let least = count.saturating_mul(bitmap + file.offsets).saturating_add(32);
+        let mut front = file.signed_front(address, b"EASB", least)?;
+        front.take(2 + file.offsets + blocks.offset).ok_or_else(broken)?;
         let written = count.checked_mul(bitmap).and_then(|size| front.take(size)).ok_or_else(broken)?;
         for number in 0..count {
             if let Some(block) = file.address(&mut front).ok_or_else(broken)? {
@@ -298,7 +300,8 @@ impl Grid {
         written: Option<&[u8]>,
         each: Each<'_>,
     ) -> Result<(), FormatProblem> {
-        let mut front = file.signed(address, b"EADB")?;
+        let least = block_size(length, blocks.page, blocks.entry);
+        let mut front = file.signed_front(address, b"EADB", least)?;
         front.take(2 + file.offsets + blocks.offset).ok_or_else(broken)?;
         if let Some(written) = written {
             front.take(4).ok_or_else(broken)?;
@@ -307,6 +310,12 @@ impl Grid {
         let entries = length.checked_mul(blocks.entry).and_then(|size| front.take(size)).ok_or_else(broken)?;
         self.entries(file, entries, blocks.entry, &blocks.order, first, each)
     }
+}
+
+/// Bytes of a block of so many entries, at most, with what stands before them and a checksum for each page.
+fn block_size(count: usize, page: usize, entry: usize) -> usize {
+    let pages = count / page.max(1) + 1;
+    count.saturating_mul(entry).saturating_add(pages.saturating_mul(5)).saturating_add(64)
 }
 
 /// How chunks are numbered.

@@ -99,10 +99,12 @@ pub fn numbers<'a>(file: &File<'a>, object: &Object<'a>, about: &Description) ->
         0 => {
             let length = front.u16().ok_or_else(broken)?;
             let data = front.take(length.into()).and_then(|data| data.get(..size)).ok_or_else(broken)?;
-            collect(file, about, count, data)
+            let mut out = file.budget.vec(count)?;
+            about.kind.numbers(data, |number| out.push(number));
+            Ok(out)
         }
         1 => match file.address(&mut front).ok_or_else(broken)? {
-            Some(address) => collect(file, about, count, file.bytes(address, size)?),
+            Some(address) => stretch(file, about.kind, count, address, size),
             None => filled(file, object, about, count),
         },
         2 => chunked(file, object, about, count, version, front),
@@ -113,9 +115,20 @@ pub fn numbers<'a>(file: &File<'a>, object: &Object<'a>, about: &Description) ->
     }
 }
 
-fn collect(file: &File<'_>, about: &Description, count: usize, data: &[u8]) -> Result<Vec<f64>, FormatProblem> {
+/// Bytes that are read at a time of numbers that stand in one stretch.
+const PIECE: usize = 1 << 20;
+
+/// Numbers that stand in one stretch of `size` bytes.
+fn stretch(file: &File<'_>, kind: Kind, count: usize, address: u64, size: usize) -> Result<Vec<f64>, FormatProblem> {
+    file.check(address, size)?;
     let mut out = file.budget.vec(count)?;
-    about.kind.numbers(data, |number| out.push(number));
+    let piece = (PIECE - PIECE % kind.size).max(kind.size);
+    let mut done = 0;
+    while done < size {
+        let bytes = file.passing(address.saturating_add(done as u64), piece.min(size - done))?;
+        kind.numbers(&bytes, |number| out.push(number));
+        done += bytes.len();
+    }
     Ok(out)
 }
 
@@ -209,8 +222,8 @@ fn place(
     out: &mut [f64],
 ) -> Result<(), FormatProblem> {
     let before = file.budget.left();
-    let packed = file.bytes(chunk.address, chunk.packed)?;
-    let data = filters::undo(file, filters, chunk.mask, packed, grid.size)?;
+    let packed = file.passing(chunk.address, chunk.packed)?;
+    let data = filters::undo(file, filters, chunk.mask, &packed, grid.size)?;
     let rank = grid.shape.len();
     if chunk.origin.iter().zip(&grid.shape).any(|(begin, length)| begin >= length) {
         return Ok(());

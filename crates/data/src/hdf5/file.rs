@@ -2,13 +2,20 @@
 //!
 //! Format specification version 3.0 (the HDF Group); roman numerals name its sections.
 
+use std::borrow::Cow;
+
 use crate::budget::Budget;
 use crate::front::Front;
 use crate::problem::FormatProblem;
+use crate::windows::Windows;
 
 const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 /// What messages call such a file.
 pub const KIND: &str = "HDF5";
+
+/// Bytes that the beginning of any description is read with.
+const LEAST: usize = 1024;
+const BEYOND: &str = "a part reaches beyond the end of the file";
 
 /// A contradiction, or an end that comes too early.
 pub fn damaged(what: &'static str) -> FormatProblem {
@@ -18,8 +25,9 @@ pub fn damaged(what: &'static str) -> FormatProblem {
 /// A file whose superblock was read.
 #[derive(Debug)]
 pub struct File<'a> {
-    /// From the superblock on: addresses count from there.
-    bytes: &'a [u8],
+    windows: &'a Windows<'a>,
+    /// Where the superblock stands: addresses count from there.
+    start: u64,
     /// Bytes of an address.
     pub offsets: usize,
     /// Bytes of a length.
@@ -37,14 +45,15 @@ impl<'a> File<'a> {
     ///
     /// # Errors
     /// [`FormatProblem`].
-    pub fn open(bytes: &'a [u8], budget: &'a Budget) -> Result<Self, FormatProblem> {
-        let places = std::iter::once(0).chain((9..31).map(|power| 1_usize << power));
-        let start =
-            places.take_while(|&place| place < bytes.len()).find(|&place| bytes[place..].starts_with(SIGNATURE));
+    pub fn open(windows: &'a Windows<'a>, budget: &'a Budget) -> Result<Self, FormatProblem> {
+        let places = std::iter::once(0).chain((9..31).map(|power| 1_u64 << power));
+        let start = places
+            .take_while(|&place| place < windows.length())
+            .find(|&place| *windows.passing(place, SIGNATURE.len()) == *SIGNATURE);
         let start = start.ok_or(FormatProblem::NotThis { kind: KIND, why: "its signature is nowhere" })?;
-        let is_matlab = start > 0 && bytes.starts_with(b"MATLAB 7.3");
-        let bytes = &bytes[start..];
-        let mut front = Front(&bytes[SIGNATURE.len()..]);
+        let is_matlab = start > 0 && *windows.passing(0, 10) == *b"MATLAB 7.3";
+        let bytes = windows.kept(start, LEAST, budget)?;
+        let mut front = Front(bytes.get(SIGNATURE.len()..).unwrap_or_default());
         let cut = || damaged("the superblock ends early");
         let version = front.u8().ok_or_else(cut)?;
         let (offsets, lengths, root) = match version {
@@ -67,25 +76,54 @@ impl<'a> File<'a> {
         if !matches!(offsets, 2 | 4 | 8) || !matches!(lengths, 2 | 4 | 8) {
             return Err(damaged("its addresses have a strange size"));
         }
-        Ok(Self { bytes, offsets: offsets.into(), lengths: lengths.into(), root, is_matlab, budget })
+        Ok(Self { windows, start, offsets: offsets.into(), lengths: lengths.into(), root, is_matlab, budget })
     }
 
-    /// What stands from an address on, to the end of the file.
+    /// What stands from an address on: the beginning of a description.
     pub fn at(&self, address: u64) -> Result<Front<'a>, FormatProblem> {
+        self.front(address, LEAST)
+    }
+
+    /// What stands from an address on: at least `least` bytes, if the file has them.
+    pub fn front(&self, address: u64, least: usize) -> Result<Front<'a>, FormatProblem> {
         // Each visit costs, so that a small file cannot send its reader round and round.
         self.budget.take(32)?;
-        let place = usize::try_from(address).ok().and_then(|address| self.bytes.get(address..));
-        place.map(Front).ok_or_else(|| damaged("an address lies outside of the file"))
+        let place = self.place(address).ok_or_else(|| damaged("an address lies outside of the file"))?;
+        Ok(Front(self.windows.kept(place, least, self.budget)?))
     }
 
-    /// `size` bytes from an address on.
+    /// `size` bytes of a description from an address on.
     pub fn bytes(&self, address: u64, size: usize) -> Result<&'a [u8], FormatProblem> {
-        self.at(address)?.take(size).ok_or_else(|| damaged("a part reaches beyond the end of the file"))
+        self.front(address, size)?.take(size).ok_or_else(|| damaged(BEYOND))
     }
 
-    /// What stands behind a signature at an address.
+    /// `size` bytes from an address on that are not kept, and nothing is taken for.
+    pub fn passing(&self, address: u64, size: usize) -> Result<Cow<'a, [u8]>, FormatProblem> {
+        self.check(address, size)?;
+        self.budget.take(32)?;
+        let place = self.place(address).ok_or_else(|| damaged(BEYOND))?;
+        let bytes = self.windows.passing(place, size);
+        if bytes.len() == size { Ok(bytes) } else { Err(damaged(BEYOND)) }
+    }
+
+    /// Whether so many bytes stand at an address.
+    pub fn check(&self, address: u64, size: usize) -> Result<(), FormatProblem> {
+        let end = self.place(address).and_then(|place| place.checked_add(size as u64));
+        if end.is_some_and(|end| end <= self.windows.length()) { Ok(()) } else { Err(damaged(BEYOND)) }
+    }
+
+    fn place(&self, address: u64) -> Option<u64> {
+        self.start.checked_add(address).filter(|place| *place <= self.windows.length())
+    }
+
+    /// What stands behind a signature at an address: the beginning of a description.
     pub fn signed(&self, address: u64, signature: &[u8; 4]) -> Result<Front<'a>, FormatProblem> {
-        let mut front = self.at(address)?;
+        self.signed_front(address, signature, LEAST)
+    }
+
+    /// As [`Self::signed`], with at least `least` bytes, if the file has them.
+    pub fn signed_front(&self, address: u64, signature: &[u8; 4], least: usize) -> Result<Front<'a>, FormatProblem> {
+        let mut front = self.front(address, least.saturating_add(4))?;
         if front.array() == Some(*signature) {
             Ok(front)
         } else {

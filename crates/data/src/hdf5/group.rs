@@ -63,7 +63,10 @@ pub fn links(file: &File<'_>, group: &Object<'_>) -> Result<Vec<Link>, FormatPro
             let broken = || damaged("a group's table of links");
             let mut front = file.signed(node, b"SNOD")?;
             front.take(2).ok_or_else(broken)?;
-            for _ in 0..front.u16().ok_or_else(broken)? {
+            let count = front.u16().ok_or_else(broken)?;
+            let mut front = file.signed_front(node, b"SNOD", 4 + usize::from(count) * (2 * file.offsets + 24))?;
+            front.take(4).ok_or_else(broken)?;
+            for _ in 0..count {
                 let mut entry = || {
                     let (name, address, cache) = (front.number(file.offsets)?, file.address(&mut front)?, front.u32()?);
                     front.take(20)?;

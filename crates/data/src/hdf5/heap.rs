@@ -38,6 +38,8 @@ pub fn global<'a>(file: &File<'a>, address: u64, index: u32) -> Result<&'a [u8],
     let mut front = file.signed(address, b"GCOL")?;
     front.take(4).ok_or_else(broken)?;
     let size = file.length(&mut front).ok_or_else(broken)?;
+    let mut front = file.signed_front(address, b"GCOL", size)?;
+    front.take(4 + file.lengths).ok_or_else(broken)?;
     let mut rest = Front(front.0.get(..size.saturating_sub(8 + file.lengths)).ok_or_else(broken)?);
     loop {
         file.budget.take(8)?;
@@ -151,7 +153,8 @@ impl<'f, 'a> Fractal<'f, 'a> {
     ) -> Result<&'a [u8], FormatProblem> {
         let broken = || damaged("a heap of links");
         let deeper = deeper.checked_sub(1).ok_or_else(broken)?;
-        let mut front = self.file.signed(address, b"FHIB")?;
+        let pointers = rows.saturating_mul(self.width).saturating_mul(self.file.offsets);
+        let mut front = self.file.signed_front(address, b"FHIB", pointers.saturating_add(32))?;
         front.take(1 + self.file.offsets + self.offset_size).ok_or_else(broken)?;
         let mut before = 0_u64;
         for row in 0..rows {

@@ -8,11 +8,34 @@ use super::object::Object;
 use super::{Contents, Found};
 use crate::problem::FormatProblem;
 use crate::reading::{Facts, Topic};
-use crate::samples::{Samples, Track};
+use crate::samples::{Samples, Track, split_off};
 use crate::{Remark, Selection, natural, times};
 
 /// Beginnings of the names of groups of which each is a demonstration, also if there is only one.
-const DEMO: [&str; 9] = ["demo_", "demo", "episode_", "episode", "traj_", "trajectory_", "trial_", "rollout_", "run_"];
+const DEMO: [&str; 15] = [
+    "demo_",
+    "demo",
+    "episode_",
+    "episode",
+    "ep_",
+    "traj_",
+    "trajectory_",
+    "trial_",
+    "trial",
+    "rollout_",
+    "run_",
+    "recording_",
+    "session_",
+    "sequence_",
+    "take_",
+];
+/// What parts of one robot or one set of sensors are called: groups that differ by a number, but stand side by side.
+const PARTS: [&str; 14] = [
+    "joint", "arm", "leg", "finger", "hand", "robot", "link", "motor", "sensor", "imu", "marker", "camera", "cam",
+    "channel",
+];
+/// Groups in groups that demonstrations are looked for in.
+const DEEPEST: usize = 6;
 /// Ends of the names of what a robot's state is; taken with the actions, where they are there, if nothing is asked for.
 const STATE: [&str; 6] = ["joint_pos", "qpos", "joint_positions", "joint_position", "proprio", "observation.state"];
 const ACTION: [&str; 2] = ["action", "actions"];
@@ -90,23 +113,29 @@ pub fn samples(file: &File<'_>, contents: &Contents, selection: &Selection) -> R
     Ok(samples)
 }
 
-/// The groups of which each is a demonstration, in natural order: siblings whose names differ by a number.
+/// Groups by their names, and what is in each by the path within it.
+type Children<'c> = BTreeMap<&'c str, BTreeMap<&'c str, &'c Found>>;
+
+/// The groups of which each is a demonstration, in natural order: siblings whose names differ by a number, or are dates.
 fn demos(contents: &Contents) -> Vec<Demo<'_>> {
-    for prefix in ["data/", ""] {
-        let mut families: BTreeMap<&str, BTreeMap<&str, BTreeMap<&str, &Found>>> = BTreeMap::new();
-        for found in contents.data_sets.iter().filter(|found| is_series(found)) {
-            let Some((child, member)) = found.path.strip_prefix(prefix).and_then(|rest| rest.split_once('/')) else {
-                continue;
-            };
-            let stem = child.trim_end_matches(|c: char| c.is_ascii_digit());
-            if stem.len() < child.len() {
-                families.entry(stem).or_default().entry(child).or_default().insert(member, found);
-            }
-        }
-        let largest = families.into_iter().max_by_key(|(_, children)| children.len());
-        if let Some((stem, children)) = largest
-            && (children.len() > 1 || prefix == "data/" || DEMO.contains(&stem))
-        {
+    let mut prefixes = vec!["data/", ""];
+    // Further down, siblings may as well be parts of one robot: only what is called so, or differs in length, is told apart.
+    let mut deeper: Vec<&str> =
+        contents.data_sets.iter().filter(|found| is_series(found)).flat_map(prefixes_of).collect();
+    deeper.sort_by_key(|prefix| (prefix.matches('/').count(), *prefix));
+    deeper.dedup();
+    prefixes.extend(deeper.into_iter().filter(|prefix| *prefix != "data/"));
+    for (index, prefix) in prefixes.into_iter().enumerate() {
+        let Some((stem, children)) = family(contents, prefix) else { continue };
+        let called_so = DEMO.contains(&stem.to_lowercase().as_str());
+        let is_part = PARTS.contains(&stem.trim_end_matches(['_', '-']).to_lowercase().as_str());
+        let several = children.len() > 1;
+        let are_demos = match (prefix, index) {
+            ("data/", _) => true,
+            ("", _) => several && (!is_part || differ_in_length(&children)) || called_so,
+            _ => several && (called_so || stem.is_empty() || differ_in_length(&children)),
+        };
+        if are_demos {
             let demo = |(name, members): (&str, _)| Demo { name: name.to_owned(), members };
             let mut demos: Vec<Demo<'_>> = children.into_iter().map(demo).collect();
             demos.sort_by(|a, b| natural(&a.name, &b.name));
@@ -116,15 +145,53 @@ fn demos(contents: &Contents) -> Vec<Demo<'_>> {
     Vec::new()
 }
 
+/// The groups around a data set, from the outermost, but for the root and its own.
+fn prefixes_of(found: &Found) -> impl Iterator<Item = &str> {
+    let slashes: Vec<usize> = found.path.match_indices('/').map(|(at, _)| at).take(DEEPEST).collect();
+    let count = slashes.len().saturating_sub(1);
+    slashes.into_iter().take(count).map(|at| &found.path[..=at])
+}
+
+/// The largest family of groups in a group, and what their names have in common.
+fn family<'c>(contents: &'c Contents, prefix: &str) -> Option<(&'c str, Children<'c>)> {
+    let mut families: BTreeMap<&str, Children<'_>> = BTreeMap::new();
+    for found in contents.data_sets.iter().filter(|found| is_series(found)) {
+        let Some((child, member)) = found.path.strip_prefix(prefix).and_then(|rest| rest.split_once('/')) else {
+            continue;
+        };
+        // A date, or a number alone.
+        let is_date = child.bytes().all(|b| b.is_ascii_digit() || b"-_:. TZ".contains(&b));
+        let stem = if is_date { "" } else { child.trim_end_matches(|c: char| c.is_ascii_digit()) };
+        if stem.len() < child.len() {
+            families.entry(stem).or_default().entry(child).or_default().insert(member, found);
+        }
+    }
+    families.into_iter().max_by_key(|(_, children)| children.len())
+}
+
+/// Whether something that all of them have has other lengths in some: parts of one recording have one.
+fn differ_in_length(children: &Children<'_>) -> bool {
+    let steps = |found: &Found| found.about.shape.as_deref().and_then(|shape| shape.first()).copied();
+    let Some(first) = children.values().next() else { return false };
+    children.values().any(|members| {
+        first.iter().any(|(path, found)| members.get(path).is_some_and(|other| steps(other) != steps(found)))
+    })
+}
+
 /// What is taken of several data sets of one recording if nothing is asked for.
 fn chosen<'p>(paths: &[&'p str]) -> Vec<&'p str> {
+    // The rows' and columns' names of a table of pandas, beside its blocks.
+    let is_index = |path: &str| {
+        let group = path.strip_suffix("axis0").or_else(|| path.strip_suffix("axis1"));
+        group.is_some_and(|group| paths.iter().any(|other| other.strip_prefix(group) == Some("block0_values")))
+    };
     let ends = |path: &str, ends: &[&str]| {
         let name = last(path);
         ends.iter().any(|end| name == *end || name.ends_with(&format!("_{end}")))
     };
     let useful = |path: &&&str| {
         let name = last(path);
-        !NOTHING.contains(&name) && !CLOCK.contains(&name) && !path.starts_with("next_obs")
+        !NOTHING.contains(&name) && !CLOCK.contains(&name) && !path.starts_with("next_obs") && !is_index(path)
     };
     let useful: Vec<&str> = paths.iter().filter(useful).copied().collect();
     let state = useful.iter().filter(|path| ends(path, &STATE));
@@ -284,13 +351,16 @@ fn of_data_sets(
         });
     }
     let channels = samples.channels.len();
-    let mut from = 0;
-    for (number, end) in ends.into_iter().enumerate() {
-        let values = track.values[from * channels..end * channels].to_vec();
-        let times = track.times.get(from..end).unwrap_or_default().to_vec();
-        samples.tracks.push(Track { name: (number + 1).to_string(), values, times });
-        from = end;
+    // From the last to the first, so that what is left goes on as it is.
+    let Track { mut values, mut times, .. } = track;
+    ends.pop();
+    for (number, from) in ends.iter().enumerate().rev() {
+        let values = split_off(&mut values, from * channels);
+        let times = times.split_off((*from).min(times.len()));
+        samples.tracks.push(Track { name: (number + 2).to_string(), values, times });
     }
+    samples.tracks.push(Track { name: "1".to_owned(), values, times });
+    samples.tracks.reverse();
     Ok(samples)
 }
 
@@ -311,6 +381,27 @@ fn array(file: &File<'_>, contents: &Contents, found: &Found, selection: &Select
     }
     if file.is_matlab && lengths.len() > 2 {
         return Err(unfit("in a MATLAB file, matrices of steps x channels".to_owned()));
+    }
+    let numbers = contents.numbers(file, found)?;
+    if let ([n, t, c], None) = (lengths, selection.axes)
+        && t >= c
+        && crate::arrays::first_is_time(*n, *t, *c, &numbers)
+    {
+        return Err(FormatProblem::Choose {
+            what: "axes",
+            there: format!(
+                "{} of {}, whose values go on along the first axis, as steps do: it may be {n} steps of {} channels",
+                shape(found),
+                found.path,
+                t * c
+            ),
+            help: format!(
+                "if so, save it as {n} x {}, in h5py by `f[\"flat\"] = f[\"{}\"][:].reshape({n}, -1)`; if it is {n} sequences, \
+                 say `axes = \"ntc\"`",
+                t * c,
+                found.path
+            ),
+        });
     }
     let axes = match selection.axes {
         Some(axes) if axes.count() != lengths.len() => {
@@ -339,7 +430,6 @@ fn array(file: &File<'_>, contents: &Contents, found: &Found, selection: &Select
             crate::Axes { sequences, steps, channels: (lengths.len() > 1).then_some(lengths.len() - 1) }
         }
     };
-    let numbers = contents.numbers(file, found)?;
     let mut strides = vec![1; lengths.len()];
     for axis in (1..lengths.len()).rev() {
         strides[axis - 1] = strides[axis] * lengths[axis];
@@ -381,10 +471,23 @@ fn track(
         (shape.first().copied().unwrap_or(0), shape.get(1).copied())
     };
     let (first_path, first) = parts[0];
-    let steps = lengths(first).0;
+    // Of a state there is often one more than of actions: what came of the last.
+    let (least, most) = parts
+        .iter()
+        .fold((usize::MAX, 0), |(least, most), (_, found)| (least.min(lengths(found).0), most.max(lengths(found).0)));
+    let one_more = most == least.saturating_add(1) && least > 1;
+    let steps = if one_more { least } else { lengths(first).0 };
+    if one_more && samples.tracks.is_empty() {
+        let longer = parts.iter().filter(|(_, found)| lengths(found).0 == most).map(|(path, _)| *path);
+        let what = format!(
+            "{} has one step more than the other data sets: its last step was left out",
+            longer.collect::<Vec<_>>().join(", ")
+        );
+        samples.remarks.push(Remark::Understood { what });
+    }
     let mut channels = Vec::new();
     for (path, found) in parts {
-        if lengths(found).0 != steps {
+        if lengths(found).0 != steps && !one_more {
             return Err(FormatProblem::Misfit {
                 found: format!("in {name}, {first_path} has {steps} steps, {path} {}", lengths(found).0),
                 needed: "data sets of one length, to stand side by side; `arrays = [...]` chooses".to_owned(),
@@ -422,8 +525,10 @@ fn track(
         }
     };
     let mut times = Vec::new();
-    if let Some(clock) = clock.filter(|clock| lengths(clock) == (steps, None)) {
-        let numbers = contents.numbers(file, clock)?;
+    let fits = |clock: &&Found| lengths(clock) == (steps, None) || one_more && lengths(clock) == (most, None);
+    if let Some(clock) = clock.filter(fits) {
+        let mut numbers = contents.numbers(file, clock)?;
+        numbers.truncate(steps);
         if let Some(read) = times::nanoseconds(&numbers) {
             times = read;
             samples.facts.clock = Some(clock.path.clone());

@@ -14,10 +14,10 @@
 
 use std::collections::BTreeSet;
 
-use crate::budget::Budget;
 use crate::problem::FormatProblem;
 use crate::samples::Samples;
 use crate::source::Source;
+use crate::windows::Windows;
 use crate::{FileError, Selection};
 
 mod chunks;
@@ -54,14 +54,18 @@ pub struct Found {
 /// # Errors
 /// [`FileError`].
 pub fn read(source: &Source<'_>, selection: &Selection) -> Result<Samples, FileError> {
-    let bytes = source.bytes()?;
-    parse(&bytes, source.budget(), selection).map_err(|problem| problem.at(source.name()))
+    of_windows(Windows::of(source)?, source, selection)
 }
 
-fn parse(bytes: &[u8], budget: &Budget, selection: &Selection) -> Result<Samples, FormatProblem> {
-    let file = File::open(bytes, budget)?;
-    let contents = Contents::read(&file)?;
-    layout::samples(&file, &contents, selection)
+/// Reads a file that is open already.
+pub fn of_windows(windows: Windows<'_>, source: &Source<'_>, selection: &Selection) -> Result<Samples, FileError> {
+    // What was kept to find the data sets is given back before they are read.
+    let budget = source.budget();
+    let contents = File::open(&windows, budget).and_then(|file| Contents::read(&file));
+    let contents = contents.map_err(|problem| windows.failure(source, problem))?;
+    let windows = windows.forget(budget);
+    let samples = File::open(&windows, budget).and_then(|file| layout::samples(&file, &contents, selection));
+    samples.map_err(|problem| windows.failure(source, problem))
 }
 
 /// All data sets of a file.

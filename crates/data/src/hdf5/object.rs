@@ -54,7 +54,11 @@ impl<'a> Object<'a> {
             let changes = if flags & 0x10 == 0 { 0 } else { 4 };
             front.take(times + changes).ok_or_else(cut)?;
             let size = front.number(1 << (flags & 3)).ok_or_else(cut)?;
-            let block = usize::try_from(size).ok().and_then(|size| front.take(size)).ok_or_else(cut)?;
+            let head = 6 + times + changes + (1 << (flags & 3));
+            let size = usize::try_from(size).ok().ok_or_else(cut)?;
+            let mut front = file.front(address, size.saturating_add(head))?;
+            front.take(head).ok_or_else(cut)?;
+            let block = front.take(size).ok_or_else(cut)?;
             blocks.push((Front(block), Shape::New { ordered: flags & 4 != 0 }));
         } else {
             if front.u8() != Some(1) {
@@ -62,7 +66,8 @@ impl<'a> Object<'a> {
             }
             front.take(7).ok_or_else(cut)?;
             let size = front.u32().ok_or_else(cut)? as usize;
-            front.take(4).ok_or_else(cut)?;
+            let mut front = file.front(address, size.saturating_add(16))?;
+            front.take(16).ok_or_else(cut)?;
             blocks.push((Front(front.take(size).ok_or_else(cut)?), Shape::Old));
         }
         let mut at = 0;

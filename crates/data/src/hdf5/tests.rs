@@ -16,8 +16,18 @@ fn fixture(name: &str) -> Vec<u8> {
     std::fs::read(folder.join("hdf5").join(name)).unwrap()
 }
 
+/// Reads it as a file, and from memory: that must be one.
 fn read_with(name: &str, selection: &Selection) -> Result<Reading, FileError> {
-    inspect_bytes(Path::new(if name.ends_with("mat") { "x.mat" } else { "x.hdf5" }), &fixture(name), selection)
+    let bytes = fixture(name);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(if name.ends_with("mat") { "x.mat" } else { "x.hdf5" });
+    std::fs::write(&path, &bytes).unwrap();
+    let (on_disk, in_memory) = (crate::inspect(&path, selection), inspect_bytes(&path, &bytes, selection));
+    match (&on_disk, &in_memory) {
+        (Ok(a), Ok(b)) => assert_eq!((&a.data, a.period, &a.remarks), (&b.data, b.period, &b.remarks), "{name}"),
+        (a, b) => assert_eq!(a.as_ref().err().map(ToString::to_string), b.as_ref().err().map(ToString::to_string)),
+    }
+    on_disk
 }
 
 fn read(name: &str) -> Reading {
@@ -94,8 +104,8 @@ fn an_aloha_episode_is_its_joints_and_its_actions() {
 #[test]
 fn numbers_of_every_kind_are_read() {
     let budget = Budget::of(64 << 20);
-    let bytes = fixture("types.h5");
-    let file = File::open(&bytes, &budget).unwrap();
+    let windows = Windows::whole(fixture("types.h5"));
+    let file = File::open(&windows, &budget).unwrap();
     let contents = Contents::read(&file).unwrap();
     let numbers = |path: &str| {
         let found = contents.data_sets.iter().find(|found| found.path == path).unwrap();
@@ -153,8 +163,8 @@ fn many_groups_and_many_chunks_are_found() {
 #[test]
 fn every_index_of_chunks_leads_to_them() {
     let budget = Budget::of(64 << 20);
-    let bytes = fixture("indexes.h5");
-    let file = File::open(&bytes, &budget).unwrap();
+    let windows = Windows::whole(fixture("indexes.h5"));
+    let file = File::open(&windows, &budget).unwrap();
     let contents = Contents::read(&file).unwrap();
     assert_eq!(contents.data_sets.len(), 11);
     let expected: Vec<f64> = (0..40).flat_map(|t| (0..3).map(move |c| state(0, t, c))).collect();
@@ -185,6 +195,50 @@ fn flags_of_the_last_step_tell_episodes_apart() {
     assert_eq!(reading.data.channels().len(), 6);
 }
 
+/// The remarks on a file, as one text.
+fn said(reading: &Reading) -> String {
+    reading.remarks.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn groups_of_one_day_each_are_sequences_and_joints_stand_side_by_side() {
+    let reading = read("dates.h5");
+    let names: Vec<&str> = reading.data.sequences().iter().map(|one| one.name.as_str()).collect();
+    assert_eq!(names, ["2024-01-30", "2024-01-31", "2024-02-01"]);
+    assert_eq!(reading.data.channels(), ["arm/q.0", "arm/q.1", "arm/q.2"]);
+    assert_eq!(reading.data.sequences()[2].sample(5), [0, 1, 2].map(|c| state(2, 5, c)));
+    let reading = read("joints.h5");
+    assert_eq!(reading.data.sequences().len(), 1);
+    assert_eq!(reading.data.channels(), [0, 1, 2].map(|c| format!("arm/joint_{c}/position")));
+    assert_eq!(reading.data.sequences()[0].sample(5), [0, 1, 2].map(|c| state(0, 5, c)));
+}
+
+#[test]
+fn a_state_more_than_actions_is_left_out_and_said() {
+    let reading = read("one_more.h5");
+    assert_eq!(reading.data.sequences().iter().map(|one| one.len()).collect::<Vec<_>>(), [6, 7, 8]);
+    let sample = reading.data.sequences()[2].sample(7);
+    assert_eq!(sample[..3], [0, 1, 2].map(|c| state(2, 7, c)));
+    assert_eq!(sample[3..], [0, 1, 2].map(|c| -state(2, 7, c)));
+    let said = said(&reading);
+    assert_eq!(said.matches("obs/agent/qpos has one step more").count(), 1, "{said}");
+}
+
+#[test]
+fn points_in_space_are_asked_about_and_a_table_of_pandas_has_no_index() {
+    let error = read_with("points.h5", &Selection::default()).unwrap_err();
+    let help = miette::Diagnostic::help(&error).unwrap().to_string();
+    assert!(
+        error.to_string().contains("40 steps of 12 channels") && help.contains("reshape(40, -1)"),
+        "{error}: {help}"
+    );
+    let as_sequences = Selection { axes: "ntc".parse().ok(), ..Selection::default() };
+    assert_eq!(read_with("points.h5", &as_sequences).unwrap().data.sequences().len(), 40);
+    let reading = read("pandas.h5");
+    assert_eq!(reading.data.channels(), [0, 1, 2].map(|c| format!("df/block0_values.{c}")));
+    assert_eq!(reading.data.sequences()[0].sample(8), [0, 1, 2].map(|c| state(0, 8, c)));
+}
+
 #[test]
 fn a_matlab_file_has_its_axes_in_reverse() {
     let reading = read("matlab.mat");
@@ -195,7 +249,8 @@ fn a_matlab_file_has_its_axes_in_reverse() {
 /// Reads all that is there.
 fn read_all(bytes: &[u8]) -> Option<usize> {
     let budget = Budget::of(BUDGET);
-    let file = File::open(bytes, &budget).ok()?;
+    let windows = Windows::whole(bytes);
+    let file = File::open(&windows, &budget).ok()?;
     let contents = Contents::read(&file).ok()?;
     let _ = layout::samples(&file, &contents, &Selection::default());
     Some(contents.data_sets.iter().filter(|found| contents.numbers(&file, found).is_ok()).count())

@@ -33,6 +33,9 @@ fn old_node<'a>(
     if found != kind || level.is_some_and(|level| here != level) || usize::from(here) > DEEPEST {
         return Err(broken());
     }
+    let head = 4 + 2 * file.offsets;
+    let mut front = file.signed_front(address, b"TREE", head + usize::from(entries) * (key + file.offsets))?;
+    front.take(head).ok_or_else(broken)?;
     for _ in 0..entries {
         file.budget.take(16)?;
         let key_bytes = front.take(key).ok_or_else(broken)?;
@@ -94,7 +97,9 @@ impl<'a> New<'_, 'a> {
         each: &mut dyn FnMut(&'a [u8]) -> Result<(), FormatProblem>,
     ) -> Result<(), FormatProblem> {
         let broken = || damaged("a tree of links or chunks");
-        let mut front = self.file.signed(address, if level == 0 { b"BTLF" } else { b"BTIN" })?;
+        let pointers = records.saturating_add(1).saturating_mul(self.pointers[level]);
+        let least = records.saturating_mul(self.record).saturating_add(pointers).saturating_add(2);
+        let mut front = self.file.signed_front(address, if level == 0 { b"BTLF" } else { b"BTIN" }, least)?;
         front.take(2).ok_or_else(broken)?;
         let all = front.take(records.checked_mul(self.record).ok_or_else(broken)?).ok_or_else(broken)?;
         let mut here = all.chunks_exact(self.record);

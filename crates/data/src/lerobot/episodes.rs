@@ -1,10 +1,11 @@
 //! Frames sorted into episodes.
 
 use std::collections::BTreeMap;
+use std::ops::{ControlFlow, Range};
 
 use super::plan::Plan;
 use crate::budget::Budget;
-use crate::parquet::{Cells, Parquet};
+use crate::parquet::Parquet;
 use crate::problem::FormatProblem;
 use crate::samples::Track;
 use crate::times;
@@ -24,6 +25,53 @@ struct Episode {
     clock: Vec<f64>,
 }
 
+/// Rows of a group that stand together and are of one episode.
+#[derive(Debug)]
+struct Stretch {
+    episode: i64,
+    rows: Range<usize>,
+    /// How many frames of the episode come before.
+    at: usize,
+}
+
+/// The value in a row of a column of whole numbers.
+fn whole(values: &[f64], row: usize, name: Option<&String>) -> Result<i64, FormatProblem> {
+    match *values {
+        [value] if value.is_finite() => Ok(value as i64),
+        _ => Err(FormatProblem::Misfit {
+            found: format!("row {} has no value of {}", row + 1, name.map_or("", String::as_str)),
+            needed: "one in each row".to_owned(),
+        }),
+    }
+}
+
+/// Finds the stretches of a group of rows.
+fn stretches(
+    file: &Parquet<'_>,
+    group: usize,
+    rows: usize,
+    leaf: Option<usize>,
+    plan: &Plan,
+    budget: &Budget,
+) -> Result<Vec<Stretch>, FormatProblem> {
+    let mut stretches: Vec<Stretch> = Vec::new();
+    match leaf {
+        None if rows > 0 => stretches.push(Stretch { episode: 0, rows: 0..rows, at: 0 }),
+        None => {}
+        Some(leaf) => file.each(group, leaf, budget, &mut |first, cells| {
+            for row in 0..cells.ends.len() {
+                let (episode, at) = (whole(cells.row(row), first + row, plan.episode.as_ref())?, first + row);
+                match stretches.last_mut().filter(|last| last.episode == episode) {
+                    Some(last) => last.rows.end = at + 1,
+                    None => stretches.push(Stretch { episode, rows: at..at + 1, at: 0 }),
+                }
+            }
+            Ok(ControlFlow::Continue(()))
+        })?,
+    }
+    Ok(stretches)
+}
+
 impl Episodes {
     /// Takes all frames of a file.
     pub fn take(&mut self, file: &Parquet<'_>, plan: &Plan, budget: &Budget) -> Result<(), FormatProblem> {
@@ -39,93 +87,119 @@ impl Episodes {
         let (episode, frame) = (one(plan.episode.as_ref())?, one(plan.frame.as_ref())?);
         let clock = one(plan.clock.as_ref().map(|(name, _)| name))?;
         let features = plan.taken().map(|feature| leaf(&feature.name)).collect::<Result<Vec<_>, _>>()?;
-        let widths: Vec<usize> = plan.taken().map(|feature| feature.width).collect();
         for group in 0..file.groups() {
-            let cells = |leaf: Option<usize>| leaf.map(|leaf| file.cells(group, leaf, budget)).transpose();
-            let (episode, frame) = (cells(episode)?, cells(frame)?);
-            let clock = cells(clock)?;
-            let features =
-                features.iter().map(|&leaf| file.cells(group, leaf, budget)).collect::<Result<Vec<_>, _>>()?;
             let rows = file.rows(group)?;
             budget.take_values::<f64>(rows.saturating_mul(plan.channels.len() + 2))?;
-            self.take_rows(rows, episode.as_ref(), frame.as_ref(), clock.as_ref(), &features, &widths, plan)?;
-            for cells in [episode, frame, clock].into_iter().flatten().chain(features) {
-                budget.give_back(cells.taken());
-            }
+            let stretches = stretches(file, group, rows, episode, plan, budget)?;
+            budget.take_values::<Stretch>(stretches.len())?;
+            let stretches = self.room(stretches, plan.channels.len(), frame.is_some(), clock.is_some());
+            self.columns(file, group, &stretches, (&features, frame, clock), plan, budget)?;
+            budget.give_back(stretches.len() * size_of::<Stretch>());
         }
         Ok(())
     }
 
-    #[expect(clippy::too_many_arguments, reason = "the columns of one group of rows, each of its own kind")]
-    fn take_rows(
-        &mut self,
-        rows: usize,
-        episode: Option<&Cells>,
-        frame: Option<&Cells>,
-        clock: Option<&Cells>,
-        features: &[Cells],
-        widths: &[usize],
-        plan: &Plan,
-    ) -> Result<(), FormatProblem> {
-        let whole = |cells: &Cells, row: usize, name: Option<&String>| match *cells.row(row) {
-            [value] if value.is_finite() => Ok(value as i64),
-            _ => Err(FormatProblem::Misfit {
-                found: format!("row {} has no value of {}", row + 1, name.map_or("", String::as_str)),
-                needed: "one in each row".to_owned(),
-            }),
-        };
-        let mut row = 0;
-        while row < rows {
-            // Rows of one episode stand together.
-            let number = episode.map_or(Ok(0), |cells| whole(cells, row, plan.episode.as_ref()))?;
-            let mut end = rows;
-            if let Some(cells) = episode {
-                end = row + 1;
-                while end < rows && whole(cells, end, plan.episode.as_ref())? == number {
-                    end += 1;
-                }
-            }
-            let into = self.all.entry(number).or_default();
+    /// Makes room for the frames of each stretch.
+    fn room(&mut self, mut stretches: Vec<Stretch>, channels: usize, frame: bool, clock: bool) -> Vec<Stretch> {
+        for stretch in &mut stretches {
+            let into = self.all.entry(stretch.episode).or_default();
+            let count = stretch.rows.len();
             // What grows by doubling holds up to three times what it needs; what grows row by row is copied for each.
-            let more = (end - row).saturating_mul(plan.channels.len());
+            let more = count * channels;
             if more > into.values.len() / 8 {
                 into.values.reserve_exact(more);
-                into.frames.reserve_exact(if frame.is_some() { end - row } else { 0 });
-                into.clock.reserve_exact(if clock.is_some() { end - row } else { 0 });
+                into.frames.reserve_exact(if frame { count } else { 0 });
+                into.clock.reserve_exact(if clock { count } else { 0 });
             }
-            while row < end {
-                for ((cells, &width), feature) in features.iter().zip(widths).zip(plan.taken()) {
-                    match cells.row(row) {
-                        [] => into.values.extend(std::iter::repeat_n(f64::NAN, width)),
-                        values if values.len() == width => into.values.extend(values),
-                        values => {
-                            return Err(FormatProblem::Misfit {
-                                found: format!("row {} has {} values of {}", row + 1, values.len(), feature.name),
-                                needed: format!("{width}, as the first row has"),
-                            });
-                        }
+            stretch.at = into.values.len() / channels.max(1);
+            into.values.resize(into.values.len() + more, f64::NAN);
+        }
+        stretches
+    }
+
+    /// Puts the columns of a group of rows in their places.
+    fn columns(
+        &mut self,
+        file: &Parquet<'_>,
+        group: usize,
+        stretches: &[Stretch],
+        (features, frame, clock): (&[usize], Option<usize>, Option<usize>),
+        plan: &Plan,
+        budget: &Budget,
+    ) -> Result<(), FormatProblem> {
+        let channels = plan.channels.len();
+        let mut column = 0;
+        for (&leaf, feature) in features.iter().zip(plan.taken()) {
+            let width = feature.width;
+            self.each_row(file, group, stretches, leaf, budget, &mut |into, frame, row, values| {
+                let place = frame * channels + column;
+                match values {
+                    [] => {}
+                    values if values.len() == width => into.values[place..place + width].copy_from_slice(values),
+                    values => {
+                        return Err(FormatProblem::Misfit {
+                            found: format!("row {} has {} values of {}", row + 1, values.len(), feature.name),
+                            needed: format!("{width}, as the first row has"),
+                        });
                     }
                 }
-                if let Some(cells) = frame {
-                    into.frames.push(whole(cells, row, plan.frame.as_ref())?);
-                }
-                if let Some(cells) = clock {
-                    let missing = || FormatProblem::Misfit {
-                        found: format!("row {} has no time", row + 1),
-                        needed: "one in each row".to_owned(),
-                    };
-                    let value = cells.row(row).first().filter(|value| value.is_finite()).ok_or_else(missing)?;
-                    into.clock.push(*value);
-                }
-                row += 1;
-            }
+                Ok(())
+            })?;
+            column += width;
+        }
+        if let Some(leaf) = frame {
+            self.each_row(file, group, stretches, leaf, budget, &mut |into, _, row, values| {
+                into.frames.push(whole(values, row, plan.frame.as_ref())?);
+                Ok(())
+            })?;
+        }
+        if let Some(leaf) = clock {
+            self.each_row(file, group, stretches, leaf, budget, &mut |into, _, row, values| {
+                let missing = || FormatProblem::Misfit {
+                    found: format!("row {} has no time", row + 1),
+                    needed: "one in each row".to_owned(),
+                };
+                into.clock.push(*values.first().filter(|value| value.is_finite()).ok_or_else(missing)?);
+                Ok(())
+            })?;
         }
         Ok(())
+    }
+
+    /// Calls `each` with the episode, the number within it, the number within the group, and the values of each row of a
+    /// column.
+    fn each_row(
+        &mut self,
+        file: &Parquet<'_>,
+        group: usize,
+        stretches: &[Stretch],
+        leaf: usize,
+        budget: &Budget,
+        each: &mut dyn FnMut(&mut Episode, usize, usize, &[f64]) -> Result<(), FormatProblem>,
+    ) -> Result<(), FormatProblem> {
+        let mut coming = stretches.iter();
+        let mut now: Option<&Stretch> = None;
+        file.each(group, leaf, budget, &mut |first, cells| {
+            let mut row = 0;
+            while row < cells.ends.len() {
+                if now.is_none_or(|now| now.rows.end <= first + row) {
+                    now = coming.next();
+                }
+                let Some(stretch) = now else { break };
+                let into = self.all.entry(stretch.episode).or_default();
+                let end = cells.ends.len().min(stretch.rows.end - first);
+                for row in row..end {
+                    each(into, stretch.at + first + row - stretch.rows.start, first + row, cells.row(row))?;
+                }
+                row = end;
+            }
+            Ok(ControlFlow::Continue(()))
+        })
     }
 
     /// How many episodes and frames there are.
-    pub fn counts(&self) -> (usize, usize) {
-        (self.all.len(), self.all.values().map(|episode| episode.frames.len()).sum())
+    pub fn counts(&self, channels: usize) -> (usize, usize) {
+        (self.all.len(), self.all.values().map(|episode| episode.values.len() / channels.max(1)).sum())
     }
 
     /// The episodes in their order, each with its frames in theirs.

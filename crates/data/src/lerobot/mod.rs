@@ -19,6 +19,7 @@ use crate::problem::FormatProblem;
 use crate::reading::Facts;
 use crate::samples::Samples;
 use crate::source::{Source, read_bytes};
+use crate::windows::Windows;
 use crate::{FileError, Remark, Selection, natural};
 
 mod episodes;
@@ -124,9 +125,9 @@ impl<'a> Reading<'a> {
 
     /// Reads one file.
     fn take(&mut self, source: &Source<'_>) -> Result<(), FileError> {
-        let bytes = source.bytes()?;
-        let at = |problem: FormatProblem| problem.at(source.name());
-        let file = Parquet::open(&bytes, source.budget()).map_err(at)?;
+        let windows = Windows::of(source)?;
+        let at = |problem: FormatProblem| windows.failure(source, problem);
+        let file = Parquet::open(&windows, source.budget()).map_err(at)?;
         let plan = match &mut self.plan {
             Some(plan) => plan,
             none => none.insert(Plan::new(&file, self.info.as_ref(), self.selection, source)?),
@@ -138,7 +139,7 @@ impl<'a> Reading<'a> {
     fn finish(self, path: &str) -> Result<Samples, FileError> {
         let Some(plan) = self.plan else { return Err(FileError::Empty { path: path.to_owned() }) };
         let mut samples = Samples { period: plan.period, remarks: plan.remarks(), ..Samples::default() };
-        let (found, frames) = self.episodes.counts();
+        let (found, frames) = self.episodes.counts(plan.channels.len());
         if let Some((episodes, all)) = self.info.as_ref().filter(|_| self.whole).and_then(Info::totals)
             && (episodes, all) != (found, frames)
         {

@@ -1,5 +1,7 @@
 //! Which columns of a parquet table are channels, which tell episodes and times, and which are left out.
 
+use std::ops::ControlFlow;
+
 use crate::budget::Budget;
 use crate::parquet::Parquet;
 use crate::problem::FormatProblem;
@@ -196,11 +198,13 @@ impl Plan {
 
 /// Values in the first list of a column that has any.
 fn width(file: &Parquet<'_>, leaf: usize, budget: &Budget) -> Result<usize, FormatProblem> {
+    let mut found = None;
     for group in 0..file.groups() {
-        let cells = file.cells(group, leaf, budget)?;
-        let width = (0..cells.ends.len()).map(|row| cells.row(row).len()).find(|&width| width > 0);
-        budget.give_back(cells.taken());
-        if let Some(width) = width {
+        file.each(group, leaf, budget, &mut |_, cells| {
+            found = (0..cells.ends.len()).map(|row| cells.row(row).len()).find(|&width| width > 0);
+            Ok(if found.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+        })?;
+        if let Some(width) = found {
             return Ok(width);
         }
     }

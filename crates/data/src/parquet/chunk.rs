@@ -3,6 +3,8 @@
 //! Levels say what is missing and where lists begin: a value's definition level is below the highest where it or a
 //! list around it is missing; its repetition level is 0 where a row begins (Dremel, Melnik et al. 2010).
 
+use std::ops::ControlFlow;
+
 use super::encoding::{byte_streams, deltas, hybrid, plain};
 use super::schema::{Leaf, Physical};
 use super::thrift::Value;
@@ -11,18 +13,25 @@ use crate::budget::Budget;
 use crate::front::Front;
 use crate::problem::FormatProblem;
 use crate::unpack::Packing;
+use crate::windows::Windows;
 
-/// Values for each byte of the pages for which room is made before they are there.
+/// Values for each byte of a page for which room is made before they are there.
 const MOST_PER_BYTE: usize = 64;
+/// Bytes that are tried first for a page's header, and then.
+const HEADS: [usize; 2] = [1 << 10, 1 << 24];
 
-/// Reads a column that `about` describes.
+/// What is done with the rows of a page or more: the number of the first, and the cells. It may have had enough.
+pub type Sink<'s> = &'s mut dyn FnMut(usize, &Cells) -> Result<ControlFlow<()>, FormatProblem>;
+
+/// Reads a column that `about` describes, page by page.
 pub fn read(
-    bytes: &[u8],
+    windows: &Windows<'_>,
     about: &Value<'_>,
     leaf: &Leaf,
     rows: usize,
     budget: &Budget,
-) -> Result<Cells, FormatProblem> {
+    sink: Sink<'_>,
+) -> Result<(), FormatProblem> {
     if !leaf.is_numeric() {
         return Err(damaged("a column that holds no numbers was asked for"));
     }
@@ -31,32 +40,36 @@ pub fn read(
         let count = about.size(5)?;
         let dictionary = about.size(11).filter(|&place| place > 0);
         let from = about.size(9)?.min(dictionary.unwrap_or(usize::MAX));
-        Some((count, bytes.get(from..from.checked_add(about.size(7)?)?)?))
+        let end = from.checked_add(about.size(7)?).filter(|&end| end as u64 <= windows.length())?;
+        Some((count, from, end))
     };
-    let (count, pages) = place().ok_or_else(|| damaged("a column's pages are not where it says"))?;
+    let (count, at, end) = place().ok_or_else(|| damaged("a column's pages are not where it says"))?;
     // A row has a value or a place for one; a list may have many.
     if count < rows {
         return Err(damaged("a column has fewer values than rows"));
     }
-    let mut column =
-        Column { leaf, packing, budget, dictionary: Vec::new(), cells: Cells::default(), pages: Front(pages) };
-    budget.take_values::<f64>(count)?;
-    budget.take_values::<usize>(rows)?;
-    // What is promised beyond that may be true, as dictionaries pack well, but has to show first.
-    if count / MOST_PER_BYTE <= pages.len() {
-        column.cells.ends.reserve_exact(rows);
-        column.cells.values.reserve_exact(count);
-    }
+    // What is given back page by page would have no end otherwise.
+    let all = count.saturating_add(rows).saturating_mul(size_of::<f64>());
+    budget.unpack(all)?;
+    budget.give_back(all);
+    let (dictionary, cells) = (Vec::new(), Cells::default());
+    let mut column = Column { leaf, packing, budget, dictionary, cells, held: 0, first: 0, windows, at, end };
     let mut left = count;
     while left > 0 {
         left = column.page(left)?;
+        if column.first + column.cells.ends.len() > rows {
+            return Err(damaged(OTHER_ROWS));
+        }
+        if column.pass_on(left == 0, sink)?.is_break() {
+            column.first = rows;
+            break;
+        }
     }
-    if column.cells.ends.len() > rows {
-        return Err(damaged("a column has other rows than its group"));
-    }
-    budget.give_back(column.dictionary.len() * size_of::<f64>());
-    Ok(column.cells)
+    budget.give_back(column.held + column.dictionary.len() * size_of::<f64>());
+    if column.first == rows { Ok(()) } else { Err(damaged(OTHER_ROWS)) }
 }
+
+const OTHER_ROWS: &str = "a column has other rows than its group";
 
 fn packing(codec: Option<i64>) -> Result<Packing, FormatProblem> {
     let name = match codec {
@@ -83,8 +96,16 @@ struct Column<'a> {
     packing: Packing,
     budget: &'a Budget,
     dictionary: Vec<f64>,
+    /// The rows of the last page, and the row before it if that may go on.
     cells: Cells,
-    pages: Front<'a>,
+    /// Bytes that are taken for them.
+    held: usize,
+    /// The number of the first.
+    first: usize,
+    windows: &'a Windows<'a>,
+    /// Where the next page begins, and where the last ends.
+    at: usize,
+    end: usize,
 }
 
 /// The levels of a page, and the values that follow.
@@ -99,14 +120,28 @@ struct Page<'a> {
 impl Column<'_> {
     /// Reads one page; how many values are left of `left`.
     fn page(&mut self, left: usize) -> Result<usize, FormatProblem> {
-        let head = Value::read(&mut self.pages).ok_or_else(|| damaged("a page's header"))?;
+        let windows = self.windows;
+        let mut bytes = windows.passing(self.at as u64, HEADS[0].min(self.end - self.at));
+        if Value::read(&mut Front(&bytes)).is_none() {
+            bytes = windows.passing(self.at as u64, HEADS[1].min(self.end - self.at));
+        }
+        let mut front = Front(&bytes);
+        let head = Value::read(&mut front).ok_or_else(|| damaged("a page's header"))?;
+        let begun = bytes.len() - front.0.len();
         let sizes = || Some((head.size(2)?, head.size(3)?));
         let (size, packed) = sizes().ok_or_else(|| damaged("a page does not say its size"))?;
-        let packed = self.pages.take(packed).ok_or_else(|| damaged("a page ends early"))?;
+        self.at += begun;
+        let ends_early = || damaged("a page ends early");
+        let end = self.at.checked_add(packed).filter(|&end| end <= self.end).ok_or_else(ends_early)?;
+        let packed = windows.passing(self.at as u64, packed);
+        if packed.len() < end - self.at {
+            return Err(ends_early());
+        }
+        self.at = end;
         match head.int(1) {
             Some(0) => {
                 let about = head.field(5).ok_or_else(|| damaged("a page does not describe its values"))?;
-                let unpacked = self.unpack(packed, size)?;
+                let unpacked = self.unpack(&packed, size)?;
                 let mut front = Front(&unpacked);
                 let mut levels = |most: u32| match most {
                     0 => Some(None),
@@ -130,7 +165,7 @@ impl Column<'_> {
             }
             Some(3) => {
                 let about = head.field(8).ok_or_else(|| damaged("a page does not describe its values"))?;
-                let mut front = Front(packed);
+                let mut front = Front(&packed);
                 let mut levels = |at: i64| front.take(about.size(at)?);
                 let read = || Some((levels(6)?, levels(5)?));
                 let (repetition, definition) = { read }().ok_or_else(|| damaged("a page's levels end early"))?;
@@ -148,7 +183,7 @@ impl Column<'_> {
             Some(2) => {
                 let about = head.field(7).ok_or_else(|| damaged("a dictionary does not say its size"))?;
                 let count = about.size(1).ok_or_else(|| damaged("a dictionary does not say its size"))?;
-                let unpacked = self.unpack(packed, size)?;
+                let unpacked = self.unpack(&packed, size)?;
                 self.budget.take_values::<f64>(count)?;
                 self.dictionary.clear();
                 plain(self.leaf, &unpacked, count, &mut self.dictionary)
@@ -189,7 +224,14 @@ impl Column<'_> {
         let full = leaf.optional as u8;
         let there =
             definition.as_ref().map_or(page.count, |levels| levels.iter().filter(|&&level| level == full).count());
+        let held = page.count.saturating_mul(size_of::<f64>() + size_of::<usize>());
+        budget.take(held)?;
+        self.held += held;
         let first = self.cells.values.len();
+        // What is promised beyond that may be true, as dictionaries pack well, but has to show first.
+        if there / MOST_PER_BYTE <= page.values.len() {
+            self.cells.values.reserve_exact(there);
+        }
         self.values(page, there)?;
         if repetition.is_none() && there == page.count {
             self.cells.ends.extend(first + 1..=first + page.count);
@@ -198,6 +240,28 @@ impl Column<'_> {
         }
         budget.give_back(taken);
         Ok(())
+    }
+
+    /// Passes on the rows that are whole: of lists all but the last, unless it was the last page.
+    fn pass_on(&mut self, last: bool, sink: Sink<'_>) -> Result<ControlFlow<()>, FormatProblem> {
+        let cells = &mut self.cells;
+        let whole = cells.ends.len().saturating_sub(usize::from(self.leaf.lists > 0 && !last));
+        if whole == 0 {
+            return Ok(ControlFlow::Continue(()));
+        }
+        let begun = cells.ends.len() > whole;
+        let rest = cells.values.split_off(cells.ends[whole - 1]);
+        cells.ends.truncate(whole);
+        let done = sink(self.first, cells)?;
+        self.first += whole;
+        cells.values.clear();
+        cells.values.extend(&rest);
+        cells.ends.clear();
+        cells.ends.extend(begun.then_some(rest.len()));
+        let kept = cells.taken();
+        self.budget.give_back(self.held.saturating_sub(kept));
+        self.held = kept;
+        Ok(done)
     }
 
     /// Decodes the values that are there behind those of the pages before.

@@ -12,6 +12,7 @@
 use crate::budget::Budget;
 use crate::front::Front;
 use crate::problem::FormatProblem;
+use crate::windows::Windows;
 
 mod chunk;
 mod encoding;
@@ -19,6 +20,7 @@ mod schema;
 mod thrift;
 pub mod write;
 
+pub use chunk::Sink;
 pub use encoding::half;
 pub use schema::Leaf;
 
@@ -34,7 +36,7 @@ fn damaged(what: &'static str) -> FormatProblem {
 /// A parquet file whose footer was read.
 #[derive(Debug)]
 pub struct Parquet<'a> {
-    bytes: &'a [u8],
+    windows: &'a Windows<'a>,
     footer: Value<'a>,
     /// The columns that hold values, in the order of the file.
     pub leaves: Vec<Leaf>,
@@ -69,32 +71,35 @@ impl<'a> Parquet<'a> {
     ///
     /// # Errors
     /// [`FormatProblem`].
-    pub fn open(bytes: &'a [u8], budget: &Budget) -> Result<Self, FormatProblem> {
-        if bytes.starts_with(b"PARE") {
+    pub fn open(windows: &'a Windows<'a>, budget: &Budget) -> Result<Self, FormatProblem> {
+        let front = windows.passing(0, 32);
+        if front.starts_with(b"PARE") {
             let help = "write it without encryption".to_owned();
             return Err(FormatProblem::NotRead { found: "it is encrypted".to_owned(), help });
         }
-        if bytes.starts_with(b"version https://git-lfs") {
+        if front.starts_with(b"version https://git-lfs") {
             let help = "`git lfs pull` in its folder fetches the data".to_owned();
             return Err(FormatProblem::NotRead {
                 found: "it is a pointer that Git LFS left in place of the data".to_owned(),
                 help,
             });
         }
-        if !bytes.starts_with(MAGIC) {
+        if !front.starts_with(MAGIC) {
             return Err(FormatProblem::NotThis { kind: KIND, why: "it does not begin with PAR1" });
         }
         let cut = || damaged("its end, where its columns are described, is missing");
-        let rest = bytes.strip_suffix(MAGIC).ok_or_else(cut)?;
-        let (rest, length) = rest.split_last_chunk().ok_or_else(cut)?;
-        let start = rest.len().checked_sub(u32::from_le_bytes(*length) as usize).ok_or_else(cut)?;
-        let footer = &rest[start..];
+        let last = windows.length().checked_sub(8).ok_or_else(cut)?;
+        let tail = windows.passing(last, 8);
+        let (length, _) = tail.strip_suffix(MAGIC).and_then(<[u8]>::split_first_chunk).ok_or_else(cut)?;
+        let length = u32::from_le_bytes(*length);
+        let start = last.checked_sub(length.into()).ok_or_else(cut)?;
+        let footer = windows.kept(start, length as usize, budget)?.get(..length as usize).ok_or_else(cut)?;
         // Each byte makes at most one value of the tree.
         budget.take(footer.len().saturating_mul(2 * size_of::<Value<'_>>()))?;
         let footer = Value::read(&mut Front(footer)).ok_or_else(|| damaged("the description of its columns"))?;
         let elements = footer.list(2).ok_or_else(|| damaged("it describes no columns"))?;
         let leaves = schema::leaves(elements, budget)?;
-        Ok(Self { bytes, footer, leaves })
+        Ok(Self { windows, footer, leaves })
     }
 
     /// How many groups of rows there are.
@@ -118,21 +123,17 @@ impl<'a> Parquet<'a> {
         self.leaves.iter().position(|leaf| leaf.name == name)
     }
 
-    /// Reads one column of a group of rows.
+    /// Reads one column of a group of rows, page by page.
     ///
     /// # Errors
     /// [`FormatProblem`].
-    pub fn cells(&self, group: usize, leaf: usize, budget: &Budget) -> Result<Cells, FormatProblem> {
+    pub fn each(&self, group: usize, leaf: usize, budget: &Budget, sink: Sink<'_>) -> Result<(), FormatProblem> {
         let rows = self.rows(group)?;
         let columns = self.footer.list(4).and_then(|groups| groups.get(group)).and_then(|group| group.list(1));
         let column = columns.and_then(|columns| columns.get(leaf)).and_then(|column| column.field(3));
         let column = column.ok_or_else(|| damaged("a group of rows lacks a column"))?;
         let leaf = self.leaves.get(leaf).ok_or_else(|| damaged("a column is not described"))?;
-        let cells = chunk::read(self.bytes, column, leaf, rows, budget)?;
-        if cells.ends.len() != rows {
-            return Err(damaged("a column has other rows than its group"));
-        }
-        Ok(cells)
+        chunk::read(self.windows, column, leaf, rows, budget, sink)
     }
 }
 

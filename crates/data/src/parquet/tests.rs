@@ -1,5 +1,6 @@
 //! Parquet files of other software, whole and damaged.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use super::*;
@@ -18,15 +19,29 @@ fn budget(bytes: &[u8]) -> Budget {
     Budget::of_file(bytes.len() as u64)
 }
 
+/// All cells of a column in a group of rows.
+pub fn cells(file: &Parquet<'_>, group: usize, leaf: usize, budget: &Budget) -> Result<Cells, FormatProblem> {
+    let mut all = Cells::default();
+    let before = budget.left();
+    file.each(group, leaf, budget, &mut |first, cells| {
+        assert_eq!((first, cells.ends.last()), (all.ends.len(), Some(&cells.values.len())));
+        all.ends.extend(cells.ends.iter().map(|end| all.values.len() + end));
+        all.values.extend(&cells.values);
+        Ok(ControlFlow::Continue(()))
+    })?;
+    assert_eq!(budget.left(), before, "what was held is given back");
+    Ok(all)
+}
+
 /// All rows of a column of a fixture.
 fn column(name: &str, leaf: &str) -> Vec<Vec<f64>> {
     let bytes = fixture(&format!("parquet/{name}.parquet"));
-    let budget = budget(&bytes);
-    let file = Parquet::open(&bytes, &budget).unwrap();
+    let (budget, windows) = (budget(&bytes), Windows::whole(bytes));
+    let file = Parquet::open(&windows, &budget).unwrap();
     let leaf = file.leaf(leaf).unwrap_or_else(|| panic!("{name}: {leaf} in {:?}", file.leaves));
     let mut rows = Vec::new();
     for group in 0..file.groups() {
-        let cells = file.cells(group, leaf, &budget).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let cells = cells(&file, group, leaf, &budget).unwrap_or_else(|error| panic!("{name}: {error}"));
         rows.extend((0..cells.ends.len()).map(|row| cells.row(row).to_vec()));
     }
     rows
@@ -72,16 +87,17 @@ fn missing_values_lists_and_elements_keep_their_places() {
     assert!([1, 3, 4].iter().all(|&row: &usize| reward[row].is_nan()));
     assert_eq!(column("missing", "episode_index").concat(), [0., 0., 0., 0., 1., 1.]);
     let bytes = fixture("parquet/missing.parquet");
-    let file = Parquet::open(&bytes, &budget(&bytes)).unwrap();
+    let windows = Windows::whole(&bytes);
+    let file = Parquet::open(&windows, &budget(&bytes)).unwrap();
     let leaf = |name| &file.leaves[file.leaf(name).unwrap()];
     assert!(!leaf("task").is_numeric());
     assert_eq!((leaf("stamp").per_second, leaf("episode_index").unsigned), (Some(1e6), true));
-    assert!(file.cells(0, file.leaf("task").unwrap(), &budget(&bytes)).is_err());
+    assert!(cells(&file, 0, file.leaf("task").unwrap(), &budget(&bytes)).is_err());
 }
 
 #[test]
 fn what_is_no_parquet_file_is_told_apart() {
-    let open = |bytes: &[u8]| Parquet::open(bytes, &budget(bytes)).map(|_| ()).unwrap_err();
+    let open = |bytes: &[u8]| Parquet::open(&Windows::whole(bytes), &budget(bytes)).map(|_| ()).unwrap_err();
     assert!(matches!(open(b"a,b\n1,2\n"), FormatProblem::NotThis { .. }));
     let pointer = open(b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 12\n");
     assert!(pointer.help().unwrap().contains("git lfs pull"), "{pointer}");
@@ -92,11 +108,13 @@ fn what_is_no_parquet_file_is_told_apart() {
 /// Reads all numeric columns; whether all could be read.
 fn read_all(bytes: &[u8]) -> bool {
     let budget = Budget::of(BUDGET);
-    let Ok(file) = Parquet::open(bytes, &budget) else { return false };
+    let windows = Windows::whole(bytes);
+    let Ok(file) = Parquet::open(&windows, &budget) else { return false };
     let mut whole = true;
     for group in 0..file.groups() {
         for leaf in (0..file.leaves.len()).filter(|&leaf| file.leaves[leaf].is_numeric()) {
-            whole &= file.cells(group, leaf, &budget).is_ok_and(|cells| cells.ends.last() == Some(&cells.values.len()));
+            whole &=
+                cells(&file, group, leaf, &budget).is_ok_and(|cells| cells.ends.last() == Some(&cells.values.len()));
         }
     }
     whole

@@ -1,4 +1,6 @@
-//! Writes parquet files: plain pages without packing, one page a column in each group of rows.
+//! Writes parquet files: plain pages without packing.
+
+use std::ops::Range;
 
 use super::MAGIC;
 use super::thrift::Writer;
@@ -60,6 +62,9 @@ struct Chunk {
     values: usize,
 }
 
+/// Values of a page, about.
+const VALUES_OF_A_PAGE: usize = 1 << 16;
+
 impl Type {
     fn is_list(self) -> bool {
         matches!(self, Self::Float(2..) | Self::Double(2..) | Self::Texts)
@@ -96,46 +101,61 @@ impl File {
     /// Writes a group of rows, with the values of each column.
     pub fn group(&mut self, rows: usize, values: &[Values<'_>]) {
         let mut chunks = Vec::with_capacity(values.len());
-        for (column, values) in self.columns.iter().zip(values) {
-            let mut page = Vec::new();
+        let columns = std::mem::take(&mut self.columns);
+        for (column, values) in columns.iter().zip(values) {
             let count = match values {
                 Values::Whole(values) => values.len(),
                 Values::Floats(values) => values.len(),
                 Values::Text(values) => values.len(),
             };
-            if column.of.is_list() {
-                levels(&mut page, rows, count / rows.max(1));
+            let (place, width) = (self.bytes.len(), count / rows.max(1));
+            // Whoever reads it holds a page at a time.
+            let each = (VALUES_OF_A_PAGE / width.max(1)).max(1);
+            let mut first = 0;
+            while first < rows || first == 0 {
+                let here = each.min(rows - first);
+                self.page(column, values, here, first * width..(first + here) * width);
+                first += here.max(1);
             }
-            match values {
-                Values::Whole(values) => page.extend(values.iter().flat_map(|value| value.to_le_bytes())),
-                Values::Floats(values) if matches!(column.of, Type::Float(_)) => {
-                    page.extend(values.iter().flat_map(|value| (*value as f32).to_le_bytes()));
-                }
-                Values::Floats(values) => page.extend(values.iter().flat_map(|value| value.to_le_bytes())),
-                Values::Text(values) => {
-                    for text in *values {
-                        page.extend((text.len() as u32).to_le_bytes());
-                        page.extend(text.as_bytes());
-                    }
-                }
-            }
-            let head = Writer::of(|head| {
-                head.i32(1, 0);
-                head.i32(2, page.len() as i32);
-                head.i32(3, page.len() as i32);
-                head.inner(5, |data| {
-                    data.i32(1, count as i32);
-                    // PLAIN; levels by RLE.
-                    data.i32(2, 0);
-                    data.i32(3, 3);
-                    data.i32(4, 3);
-                });
-            });
-            chunks.push(Chunk { place: self.bytes.len(), size: head.len() + page.len(), values: count });
-            self.bytes.extend(head);
-            self.bytes.extend(page);
+            chunks.push(Chunk { place, size: self.bytes.len() - place, values: count });
         }
+        self.columns = columns;
         self.groups.push(Group { rows, chunks });
+    }
+
+    /// Writes a page of so many rows, with the values of this range.
+    fn page(&mut self, column: &Column, values: &Values<'_>, rows: usize, range: Range<usize>) {
+        let (mut page, count) = (Vec::new(), range.len());
+        if column.of.is_list() {
+            levels(&mut page, rows, count / rows.max(1));
+        }
+        match values {
+            Values::Whole(values) => page.extend(values[range].iter().flat_map(|value| value.to_le_bytes())),
+            Values::Floats(values) if matches!(column.of, Type::Float(_)) => {
+                page.extend(values[range].iter().flat_map(|value| (*value as f32).to_le_bytes()));
+            }
+            Values::Floats(values) => page.extend(values[range].iter().flat_map(|value| value.to_le_bytes())),
+            Values::Text(values) => {
+                for text in &values[range] {
+                    page.extend((text.len() as u32).to_le_bytes());
+                    page.extend(text.as_bytes());
+                }
+            }
+        }
+        let head = Writer::of(|head| {
+            head.i32(1, 0);
+            head.i32(2, page.len() as i32);
+            head.i32(3, page.len() as i32);
+            head.inner(5, |data| {
+                data.i32(1, count as i32);
+                // PLAIN; levels by RLE.
+                data.i32(2, 0);
+                data.i32(3, 3);
+                data.i32(4, 3);
+            });
+        });
+        self.bytes.extend(head);
+        self.bytes.extend(page);
     }
 
     /// The bytes of the file, with notes for those who read it.
@@ -299,10 +319,11 @@ mod tests {
         }
         let bytes = file.finish(&[("key", "value")]);
         let budget = Budget::of(1 << 20);
-        let file = Parquet::open(&bytes, &budget).unwrap();
+        let windows = crate::windows::Windows::whole(bytes);
+        let file = Parquet::open(&windows, &budget).unwrap();
         let names: Vec<&str> = file.leaves.iter().map(|leaf| leaf.name.as_str()).collect();
         assert_eq!(names, ["state", "short", "one", "number", "task", "tasks"]);
-        let cells = |group, leaf| file.cells(group, leaf, &budget).unwrap();
+        let cells = |group, leaf| crate::parquet::tests::cells(&file, group, leaf, &budget).unwrap();
         assert_eq!((file.groups(), cells(1, 0).row(4)), (2, [13.1, 14.1, 15.1].as_slice()));
         assert_eq!(cells(0, 1).row(0), [f64::from(0.1_f32), f64::from(1.1_f32)]);
         assert_eq!(cells(1, 3).values, [1., -2., 3., 4., 1.]);

@@ -45,7 +45,9 @@ impl Separator {
         let found = candidates.into_iter().zip(outside).find(|(_, found)| *found);
         let found = match found {
             Some((candidate, _)) => Self::Character(candidate),
-            None if line.trim_end().ends_with(';') => Self::Character(';'),
+            None if line.trim_end().ends_with(';') && !are_numbers(line.trim_end().trim_end_matches(';')) => {
+                Self::Character(';')
+            }
             None => Self::Whitespace,
         };
         // Between tabs or spaces, commas may be decimal ones: if all that stands there are numbers then.
@@ -65,6 +67,12 @@ impl Separator {
             Self::Whitespace => "spaces or tabs",
         }
     }
+}
+
+/// Whether the line is several numbers with spaces between them.
+fn are_numbers(line: &str) -> bool {
+    let number = |text: &str| matches!(Value::of(text), Value::Number(_));
+    line.split_whitespace().count() > 1 && line.split_whitespace().all(number)
 }
 
 /// Whether the line has several fields between these separators, all of them numbers, some with a decimal comma.

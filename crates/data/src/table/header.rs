@@ -135,6 +135,13 @@ impl Layout {
         let row = samples.iter().find(|line| line.number >= layout.first).copied();
         let count = row.map(|line| trimmed(&fields_of(&line, separator)));
         layout.name(text, &above, row, count, separator)?;
+        if !layout.named && stamped(&samples, separator) && layout.columns.len() > 2 {
+            for (column, name) in layout.columns.iter_mut().zip(["stamp.sec", "stamp.nanosec"]) {
+                column.name = Some(name.to_owned());
+            }
+            let what = "the first two columns, which have no names, are the seconds and nanoseconds of a stamp";
+            layout.remarks.push(Remark::Understood { what: what.to_owned() });
+        }
         layout.look(text, separator);
         layout.number_doubles();
         layout.notation(text, separator)?;
@@ -544,6 +551,23 @@ fn counts_columns(samples: &[Line<'_>], separator: Separator) -> bool {
     (0..first.len()).any(|column| {
         let jump = (first[column].text.parse().unwrap_or(0.0) - second[column]).abs();
         jump > 3.0 * largest(column)
+    })
+}
+
+/// Whether rows without a header begin with seconds and nanoseconds, as ROS prints a stamp: whole numbers, of which the second
+/// stays below a billion and reaches the millions, and which rise together.
+fn stamped(samples: &[Line<'_>], separator: Separator) -> bool {
+    let whole = |field: Option<&Field<'_>>| field.and_then(|field| field.text.parse::<u64>().ok());
+    let stamp = |line: &Line<'_>| {
+        let fields = fields_of(line, separator);
+        whole(fields.first()).zip(whole(fields.get(1))).filter(|(_, nanoseconds)| *nanoseconds < 1_000_000_000)
+    };
+    let stamps: Option<Vec<(u64, u64)>> = samples.iter().map(stamp).collect();
+    stamps.is_some_and(|stamps| {
+        stamps.len() > 4
+            && stamps.windows(2).all(|pair| pair[0] < pair[1])
+            && stamps.iter().any(|(_, nanoseconds)| *nanoseconds >= 1_000_000)
+            && stamps.windows(2).all(|pair| pair[1].0 - pair[0].0 < 1000)
     })
 }
 

@@ -391,8 +391,8 @@ fn exact(text: &str) -> Option<(i128, usize)> {
             fraction.trim_end_matches('0').len().min(9),
         ));
     }
-    let number: f64 = text.parse().ok()?;
-    // Scientific notation, as numpy.savetxt writes: as exact as the number.
+    // Scientific notation, as numpy.savetxt writes, or Fortran: as exact as the number.
+    let Value::Number(number) = Value::of(text) else { return None };
     (number.abs() < 1e20).then(|| ((number * 1e9).round() as i128, 9))
 }
 
@@ -406,6 +406,7 @@ mod tests {
         assert_eq!(exact("1766147454.2332180"), Some((1_766_147_454_233_218_000, 6)));
         assert_eq!(exact("-0.06666666666666667"), Some((-66_666_667, 9)));
         assert_eq!(exact("2.000000000000000042e-02"), Some((20_000_000, 9)));
+        assert_eq!(exact("2.5D-02"), Some((25_000_000, 9)));
         for text in ["", ".", "-", "1x", "nan", "inf", "1e300"] {
             assert_eq!(exact(text), None, "{text}");
         }

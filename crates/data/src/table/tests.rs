@@ -205,3 +205,37 @@ fn names_that_a_spreadsheet_would_run_are_written_apart_and_read_back() {
     let again = crate::read(&path).unwrap();
     assert_eq!((again.channels(), &again.sequences()[0].name), (data.channels(), &data.sequences()[0].name));
 }
+
+#[test]
+fn rows_that_close_with_semicolons_are_numbers_between_spaces() {
+    let rows = "0.00D+00  1.5D-1  2.0D+0;\n2.00D-02  1.6D-1  2.5D+0;\n4.00D-02  1.7D-1  3.0D+0;\n";
+    let set = read_bytes("log.dat", format!("% time x y\n{rows}").as_bytes()).unwrap();
+    assert_eq!(set.channels(), ["x", "y"]);
+    assert_eq!(set.sequences()[0].values(), [0.15, 2.0, 0.16, 2.5, 0.17, 3.0]);
+    // One number to a row, and names with spaces in them.
+    assert_eq!(contents("a b;\n1;\n2;\n"), expected(&["a b"], &[("1", &[1.0, 2.0])]));
+}
+
+#[test]
+fn a_stamp_without_a_name_is_a_clock() {
+    // `ros2 topic echo --csv /joint_states`: seconds, nanoseconds, frame, names, positions.
+    let row = |k: u64| {
+        let nanoseconds = 900_000_000 + 20_000_000 * k;
+        format!(
+            "{},{},base,shoulder,elbow,{}.5,-{k}.25\n",
+            1_700_000_000 + nanoseconds / 1_000_000_000,
+            nanoseconds % 1_000_000_000,
+            k
+        )
+    };
+    let text: String = (0..12).map(row).collect();
+    let reading =
+        crate::inspect_bytes(std::path::Path::new("echo.csv"), text.as_bytes(), &Selection::default()).unwrap();
+    assert_eq!((reading.data.channels().len(), reading.period), (2, Some(0.02)));
+    assert_eq!(reading.data.sequences()[0].sample(7), [7.5, -7.25]);
+    assert_eq!(reading.facts.clock.as_deref(), Some("stamp.sec and stamp.nanosec"));
+    // Two channels of whole numbers are no stamp.
+    for text in ["1,2\n2,3\n3,4\n4,5\n5,6\n", "5,1000000,1\n4,2000000,1\n3,3000000,2\n2,4000000,3\n1,5000000,4\n"] {
+        assert!(contents(text).0.len() > 1 && contents(text).0[0] == "y1", "{text}");
+    }
+}

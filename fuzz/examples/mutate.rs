@@ -1,7 +1,7 @@
 //! The targets on a stable compiler: seeds, changed at random but the same for the same number of runs.
 //!
 //! ```text
-//! cargo run --release --bin mutate -- TARGET RUNS SEED-FILES...
+//! cargo run --release --example mutate -- TARGET RUNS SEED-FILES...
 //! ```
 //!
 //! Without libFuzzer nobody looks which code a change reaches: what is found counts, what is not proves less.
