@@ -11,7 +11,7 @@ use scrnn_data::{Reading, Remark, read_all, suspicions};
 use scrnn_tasks::{Task, TaskName, make};
 
 /// Sequences in their own units.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Source {
     /// What is learned.
     pub data: Dataset,
@@ -34,7 +34,7 @@ impl Source {
 }
 
 /// The true variances of a task.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Truth {
     /// The task.
     pub task: TaskName,

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 pub use comments::{Comment, in_lines};
 pub use difference::{Difference, differences};
 pub use overrides::Override;
-pub use reading::{read, read_text};
+pub use reading::{Base, read, read_text, table};
 pub use scrnn::learning::{Adam, AdaptiveRate, ClosedLoop, Lbfgs, Momentum, OnDivergence, PriorStep};
 pub use scrnn::topology::Group;
 pub use scrnn_tasks::TaskName;
