@@ -188,6 +188,14 @@ pub fn forget(folder: &Path) {
     }
 }
 
+/// Whether a claim was not renewed for so long, by the file system's clock, which `now` was just written by. One that has just vanished is
+/// looked at again later.
+fn is_old(claim: &Path, (now, patience): (&Path, Duration)) -> bool {
+    let changed = |path: &Path| fs::metadata(path).and_then(|found| found.modified()).ok();
+    let (Some(then), Some(now)) = (changed(claim), changed(now)) else { return false };
+    now.duration_since(then).is_ok_and(|age| age > patience)
+}
+
 /// What tells whether a training got further.
 fn mark(checkpoint: &Path) -> String {
     let Ok(found) = fs::metadata(checkpoint) else { return String::new() };
@@ -205,18 +213,19 @@ impl Claim {
         let disk = |error| Failure::disk("claim the run in", folder, error);
         let there = numbers(folder).map_err(disk)?;
         let before = there.last().copied();
+        let holder = before.and_then(|number| read(folder, number));
+        let is_near = holder.as_ref().is_some_and(|holder| !me().place.is_empty() && holder.place == me().place);
+        if is_near && holder.as_ref().is_some_and(runs) {
+            return Ok(Taken::Busy);
+        }
         // The claim that is written stands beside its place first, and tells the file system's time.
         let mine = Written::new(folder, mark(checkpoint)).map_err(disk)?;
-        let lost = match before {
-            None => None,
-            Some(number) => {
-                let holder = read(folder, number);
-                if !Self::is_gone(folder, number, holder.as_ref(), (&mine, patience)) {
-                    return Ok(Taken::Busy);
-                }
-                Some(holder.map(|holder| holder.token))
-            }
-        };
+        if let Some(number) = before.filter(|_| !is_near)
+            && !is_old(&path_of(folder, number), (&mine.path, patience))
+        {
+            return Ok(Taken::Busy);
+        }
+        let lost = before.map(|_| holder.map(|holder| holder.token));
         if let Some(number) = before.filter(|&number| number >= MOST_LOST) {
             let found = |number| read(folder, number).map(|holder| holder.found);
             if found(number + 1 - MOST_LOST) == Some(mark(checkpoint)) {
@@ -237,20 +246,6 @@ impl Claim {
         }
         claim.remove_own();
         Ok(Taken::Busy)
-    }
-
-    fn is_gone(folder: &Path, number: u64, holder: Option<&Holder>, (mine, patience): (&Written, Duration)) -> bool {
-        let path = path_of(folder, number);
-        if let Some(holder) = holder
-            && !me().place.is_empty()
-            && holder.place == me().place
-        {
-            return !runs(holder);
-        }
-        let changed = |path: &Path| fs::metadata(path).and_then(|found| found.modified()).ok();
-        // One that has just vanished is looked at again later.
-        let (Some(then), Some(now)) = (changed(&path), changed(&mine.path)) else { return false };
-        now.duration_since(then).is_ok_and(|age| age > patience)
     }
 
     /// Whether nobody took the run over.

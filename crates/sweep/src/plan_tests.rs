@@ -85,7 +85,7 @@ fn conditions_set_several_keys_and_begin_from_experiments_of_their_own() {
     let wide = plan.experiment(&plan.runs[5]).unwrap();
     assert_eq!((wide.training.epochs, wide.network.groups[0].units), (20, 5));
     assert_eq!(wide.network.initial_state_variance, 0.5);
-    assert_eq!(wide.training.adam.unwrap().clip_norm, Some(2.0));
+    assert_eq!(wide.training.adam.unwrap().clip_norm, 2.0);
 }
 
 #[test]

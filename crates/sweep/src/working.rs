@@ -222,6 +222,7 @@ pub fn prepare(plan: &Plan, folder: &Path, messages: &dyn Messages) -> Result<()
         return Err(Failure::refused(message, "--out FOLDER writes the sweep elsewhere"));
     }
     std::fs::create_dir_all(folder).map_err(|error| Failure::disk("make the folder", folder, error))?;
+    let _ = scrnn_data::sweep(folder);
     let text = plan.listed().text();
     let path = folder.join(PLAN);
     match std::fs::read_to_string(&path) {
@@ -388,6 +389,8 @@ impl Work<'_> {
         };
         outcome::write(folder, TIMES, &times)?;
         outcome::remove(folder, FAILED);
+        // What others left who were killed while they looked.
+        let _ = scrnn_data::sweep(folder);
         // Last: with it the run is finished.
         outcome::write(folder, OUTCOME, &outcome)?;
         Ok(Some(ended))
