@@ -429,7 +429,7 @@ pub fn shown(value: &serde_json::Value) -> String {
     match value {
         serde_json::Value::String(text) => text.clone(),
         serde_json::Value::Number(number) => match number.as_f64().filter(|_| number.is_f64()) {
-            Some(value) if value != 0.0 && !(1e-3..1e6).contains(&value.abs()) => format!("{value:e}"),
+            Some(value) if value != 0.0 && !(1e-2..1e6).contains(&value.abs()) => format!("{value:e}"),
             Some(value) => value.to_string(),
             None => number.to_string(),
         },

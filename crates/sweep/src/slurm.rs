@@ -97,7 +97,8 @@ impl Request {
              # Written by `scrnn sweep --slurm`. A task works on its shard of the sweep; one that comes again goes on.\n\
              {program} sweep {sweep} --out {folder} --shard \"$SLURM_ARRAY_TASK_ID/{tasks}\" --threads {cores} &\n\
              work=$!\n\
-             trap 'kill -TERM \"$work\" 2>/dev/null' TERM\n\
+             # SLURM sends SIGTERM to all processes of a task, SIGUSR1 to this one alone.\n\
+             trap : TERM\n\
              trap 'kill -USR1 \"$work\" 2>/dev/null' USR1\n\
              # A signal ends the waiting, not the work.\n\
              wait \"$work\"\n\
