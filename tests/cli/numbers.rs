@@ -11,8 +11,9 @@ const VALUES: [&str; 10] =
     ["0", "1", "2", "-1", "2147483648", "4294967296", "9223372036854775808", "18446744073709551615", "1e308", "NaN"];
 
 /// Keys of the experiment file.
-const KEYS: [&str; 49] = [
+const KEYS: [&str; 50] = [
     "seed",
+    "data.left",
     "data.seed",
     "data.sequences",
     "data.steps",
@@ -108,6 +109,7 @@ fn every_numeric_option_takes_a_value_or_refuses_it_and_never_panics() {
     place.write("sine.toml", super::following::INTERACT.replace("epochs = 5", "epochs = 2"));
     place.ok("train sine.toml --out interact -q");
     place.write("sine.toml", SINE.replace("epochs = 120", "epochs = 5"));
+    place.write("sweep.toml", "name = \"many\"\nexperiment = \"sine.toml\"\nseeds = 2\n");
     for (command, option, line) in OPTIONS {
         // Whoever asks for 2^31 epochs of training gets them.
         let is_long = *option == "epochs";

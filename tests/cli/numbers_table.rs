@@ -47,6 +47,8 @@ pub const OPTIONS: &[(&str, &str, &str)] = &[
     ("simulate interact", "momentum", "simulate interact interact --ers --steps 1 --window 5"),
     ("simulate interact", "max-norm", "simulate interact interact --ers --steps 1 --window 5"),
     ("simulate interact", "deadline", "simulate interact interact --ers --steps 1 --window 5"),
+    ("sweep", "stale", "sweep sweep.toml --dry-run"),
+    ("sweep", "array-size", "sweep sweep.toml --slurm --dry-run"),
     ("reproduce", "seeds", "reproduce sinusoid --epochs 1 --out r --overwrite"),
     ("reproduce", "seed", "reproduce sinusoid --epochs 1 --out r --overwrite"),
     ("reproduce", "epochs", "reproduce sinusoid --out r --overwrite"),

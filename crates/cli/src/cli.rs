@@ -7,7 +7,8 @@ use scrnn::engine::InstructionSet;
 
 use crate::args::Shared;
 use crate::command::{
-    completions, convert, data, evaluate, export, generate, inspect, recognize, report, reproduce, simulate, train,
+    compare, completions, convert, data, evaluate, export, generate, inspect, recognize, report, reproduce, simulate,
+    sweep, train,
 };
 
 static VERSION: LazyLock<String> =
@@ -38,6 +39,7 @@ Exit codes:
   3    the training diverged; it was rolled back, and the last good state is saved
   4    a file could not be read or written
   5    refused: the run folder is busy or holds a run, or experiment or data changed
+       of `scrnn sweep`: 3 if a network diverged; 2, 4 or 5 if one could not be finished, as the first of these would have ended
   6    the results could not be written to stdout; files are written
   130  interrupted by Ctrl-C; the state is saved
        so for SIGHUP 129, SIGUSR1 138, SIGTERM 143, SIGXCPU 152";
@@ -60,6 +62,8 @@ pub struct Cli {
 pub enum Command {
     Data(data::Arguments),
     Train(train::Arguments),
+    Sweep(sweep::Arguments),
+    Compare(compare::Arguments),
     Generate(generate::Arguments),
     Recognize(recognize::Arguments),
     Evaluate(evaluate::Arguments),

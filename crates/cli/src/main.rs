@@ -33,6 +33,8 @@ fn run() -> u8 {
     let ending = match command {
         Command::Data(arguments) => command::data::run(&arguments, &shared),
         Command::Train(arguments) => command::train::run(&arguments, (&shared, &signals)),
+        Command::Sweep(arguments) => command::sweep::run(&arguments, (&shared, &signals)),
+        Command::Compare(arguments) => command::compare::run(&arguments, &shared),
         Command::Generate(arguments) => command::generate::run(&arguments, &shared),
         Command::Recognize(arguments) => command::recognize::run(&arguments, &shared),
         Command::Evaluate(arguments) => command::evaluate::run(&arguments, &shared),

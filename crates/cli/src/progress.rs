@@ -23,17 +23,24 @@ const BETWEEN_UPDATES: Duration = Duration::from_millis(100);
 pub struct Bars {
     all: MultiProgress,
     quiet: bool,
+    /// Whether a bar goes away with its training.
+    passing: bool,
 }
 
 impl Bars {
     /// None yet.
     pub fn new(quiet: bool) -> Self {
-        Self { all: MultiProgress::new(), quiet }
+        Self { all: MultiProgress::new(), quiet, passing: false }
+    }
+
+    /// The same for so many trainings that nobody wants to see those that are over.
+    pub fn passing(quiet: bool) -> Self {
+        Self { passing: true, ..Self::new(quiet) }
     }
 
     /// For a training of `total` epochs; `label` goes before what is shown of it.
     pub fn bar(&self, label: &str, total: u64) -> Box<dyn messages::Progress> {
-        Box::new(Progress::labelled(label, total, self.quiet, &self.all))
+        Box::new(Progress { passing: self.passing, ..Progress::labelled(label, total, self.quiet, &self.all) })
     }
 }
 
@@ -47,6 +54,7 @@ struct Progress {
     shown: Instant,
     /// What the last look at sequences that are held out came to.
     held_out: Option<String>,
+    passing: bool,
 }
 
 #[derive(Debug)]
@@ -67,7 +75,15 @@ impl Progress {
         } else {
             Display::Lines
         };
-        Self { label: label.to_owned(), display, total, start: None, shown: Instant::now(), held_out: None }
+        Self {
+            label: label.to_owned(),
+            display,
+            total,
+            start: None,
+            shown: Instant::now(),
+            held_out: None,
+            passing: false,
+        }
     }
 }
 
@@ -94,7 +110,7 @@ impl messages::Progress for Progress {
             Display::Lines => BETWEEN_LINES,
             Display::Bar(_) => BETWEEN_UPDATES,
         };
-        if now.duration_since(self.shown) < pause && report.epoch != self.total {
+        if now.duration_since(self.shown) < pause && (self.passing || report.epoch != self.total) {
             return;
         }
         self.shown = now;
@@ -135,6 +151,9 @@ impl messages::Progress for Progress {
     /// Leaves the terminal in order.
     fn finish(&self) {
         if let Display::Bar(bar) = &self.display {
+            if self.passing {
+                return bar.finish_and_clear();
+            }
             bar.abandon();
         }
     }

@@ -10,6 +10,7 @@
 //! | `reading` | sequences from files and to files, and those of the thesis' tasks |
 //! | `model`, `training` | a trained network in memory, and how it comes about |
 //! | `using`, `following`, `judging` | generation and recognition, error regression, evaluation |
+//! | `sweeps` | many networks: one of them at a time, for whatever hands out the work |
 //! | `studies` | the thesis' experiments and its robots |
 
 use pyo3::prelude::*;
@@ -22,6 +23,7 @@ mod machine;
 mod model;
 mod reading;
 mod studies;
+mod sweeps;
 mod texts;
 mod training;
 mod using;
@@ -51,6 +53,10 @@ fn _scrnn(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(reading::read, module)?)?;
     module.add_function(wrap_pyfunction!(reading::write, module)?)?;
     module.add_function(wrap_pyfunction!(reading::task, module)?)?;
+    module.add_function(wrap_pyfunction!(sweeps::sweep_plan, module)?)?;
+    module.add_function(wrap_pyfunction!(sweeps::sweep_run, module)?)?;
+    module.add_function(wrap_pyfunction!(sweeps::sweep_status, module)?)?;
+    module.add_function(wrap_pyfunction!(sweeps::compare, module)?)?;
     module.add_function(wrap_pyfunction!(studies::studies, module)?)?;
     module.add_function(wrap_pyfunction!(studies::reproduce, module)?)?;
     module.add_function(wrap_pyfunction!(studies::simulate_reach, module)?)?;

@@ -15,7 +15,7 @@ import pytest
 
 import scrnn
 
-MODULES = ["_data", "_results", "_estimators", "_following", "_studies", "_progress", "_scrnn"]
+MODULES = ["_data", "_results", "_estimators", "_following", "_studies", "_sweeps", "_progress", "_scrnn"]
 
 
 def examples() -> list[Any]:

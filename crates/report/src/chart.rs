@@ -106,6 +106,8 @@ pub enum Mark {
     Dots,
     /// A text at each.
     Texts(Vec<String>),
+    /// A square around each, one unit wide and high, filled as strongly as said (0 to 1), with a text in it. Axes then have no numbers.
+    Cells(Vec<(f64, String)>),
 }
 
 /// Points that belong together.
@@ -227,6 +229,7 @@ impl Chart {
                 for (k, (x, y)) in series.points.iter().enumerate() {
                     let name = match &series.mark {
                         Mark::Texts(texts) => csv_field(&format!("{} {}", series.name, texts[k])),
+                        Mark::Cells(cells) => csv_field(&format!("{} {}", series.name, cells[k].1)),
                         _ => csv_field(&series.name),
                     };
                     writeln!(text, "{},{name},{x:?},{y:?}", csv_field(&panel.title)).expect("a string takes all");
@@ -338,6 +341,9 @@ impl Chart {
             .y_labels(if small { 3 } else { 5 })
             .x_label_formatter(&format_x)
             .y_label_formatter(&format_y);
+        if panel.series.iter().any(|series| matches!(series.mark, Mark::Cells(_))) {
+            mesh.x_labels(0).y_labels(0).disable_mesh();
+        }
         if small && self.y_label.is_empty() {
             mesh.y_labels(0);
         }
@@ -361,12 +367,19 @@ impl Chart {
                     chart
                         .draw_series(points().map(|at| Circle::new(at, if small { 3 } else { 5 }, colour.filled())))?;
                 }
+                Mark::Cells(cells) => {
+                    let style = (FONT, TEXT).into_font().color(&ink).pos(centred());
+                    for (&(x, y), (strength, text)) in series.points.iter().zip(cells) {
+                        let corners = [inside((x - 0.5, y - 0.5)), inside((x + 0.5, y + 0.5))];
+                        // Text has to stay readable on it, in both themes.
+                        let fill = colour.mix(0.05 + 0.5 * strength.clamp(0.0, 1.0));
+                        chart.draw_series([Rectangle::new(corners, fill.filled())])?;
+                        chart.draw_series([Text::new(text.clone(), inside((x, y)), style.clone())])?;
+                    }
+                }
                 Mark::Texts(texts) => {
                     let style = (FONT, TEXT).into_font().color(&colour);
-                    let style = style.pos(plotters::style::text_anchor::Pos::new(
-                        plotters::style::text_anchor::HPos::Center,
-                        plotters::style::text_anchor::VPos::Center,
-                    ));
+                    let style = style.pos(centred());
                     chart.draw_series(
                         points().zip(texts).map(|(at, text)| Text::new(text.clone(), at, style.clone())),
                     )?;
@@ -382,6 +395,12 @@ impl Chart {
         }
         Ok(())
     }
+}
+
+/// In the middle of its place.
+fn centred() -> plotters::style::text_anchor::Pos {
+    use plotters::style::text_anchor::{HPos, Pos, VPos};
+    Pos::new(HPos::Center, VPos::Center)
 }
 
 /// A number on an axis of this length, with as many digits as its neighbours need to differ.
@@ -455,6 +474,23 @@ mod tests {
         assert!(!svg.contains("NaN"));
         // Every colour is one of the theme.
         assert!(!svg.contains("\"#"), "{svg}");
+    }
+
+    #[test]
+    fn cells_are_filled_in_colours_of_the_theme_and_hold_their_texts() {
+        let cells = vec![(0.0, "one".to_owned()), (2.0, "two & more".to_owned())];
+        let series = Series {
+            name: "nll".into(),
+            tone: Tone::Ours,
+            mark: Mark::Cells(cells),
+            points: vec![(1.0, 1.0), (2.0, 1.0)],
+        };
+        let panel = Panel { title: String::new(), x: (0.5, 2.5), y: (0.5, 1.5), series: vec![series], failed: false };
+        let chart = Chart { columns: 1, aspect: 2.0, x_label: "a".into(), y_label: "b".into(), panels: vec![panel] };
+        let svg = themed(chart.svg("Cells"));
+        assert!(svg.matches("<rect").count() >= 2 && svg.contains("opacity=\"0.55\""), "{svg}");
+        assert!(svg.contains("two &amp; more") && !svg.contains("\"#"), "{svg}");
+        assert!(chart.csv().contains("nll one,1.0,1.0\n"), "{}", chart.csv());
     }
 
     #[test]

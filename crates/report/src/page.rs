@@ -46,6 +46,8 @@ pub enum Block {
     Sheet(Sheet),
     /// A figure.
     Figure(Box<Figure>),
+    /// Links to files beside the page: texts with their paths.
+    Links(Vec<(String, String)>),
 }
 
 /// A table. Columns of numbers stand to the right; the words "met" and "missed" are coloured.
@@ -161,8 +163,28 @@ impl Block {
             Self::Verbatim(text) => *out += &format!("<pre>{}</pre>\n", escaped(text)),
             Self::Sheet(sheet) => sheet.html(out),
             Self::Figure(figure) => figure.html(out),
+            Self::Links(links) => {
+                let link = |(text, path): &(String, String)| {
+                    format!("<a href=\"{}\">{}</a>\n", escaped(&address(path)), escaped(text))
+                };
+                *out += &format!("<p class=\"links\">\n{}</p>\n", links.iter().map(link).collect::<String>());
+            }
         }
     }
+}
+
+/// A path as an address that starts from the page: what would mean something else in it is written by its bytes.
+fn address(path: &str) -> String {
+    let mut out = "./".to_owned();
+    for byte in path.bytes() {
+        match byte {
+            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'_' | b'.' | b'/' | b'=' | b',' | b'+' => {
+                out.push(char::from(byte))
+            }
+            byte => out += &format!("%{byte:02X}"),
+        }
+    }
+    out
 }
 
 impl Sheet {
@@ -262,6 +284,10 @@ mod tests {
             Block::Verbatim("a = 1".into()),
             Block::Sheet(sheet),
             Block::Figure(Box::new(figure)),
+            Block::Links(vec![
+                ("a <run>".into(), "x=1,y z/seed-1/report.html".into()),
+                ("b".into(), "javascript:alert(1)".into()),
+            ]),
         ];
         let sections = vec![Section { title: "One & two".into(), blocks }];
         let page = Page { title: "P".into(), lede: "L".into(), sections };
@@ -272,6 +298,8 @@ mod tests {
             "One &amp; two",
             "<td class=\"n\">1.5</td><td class=\"passed\">met</td><td class=\"n\">0.1",
             "Thesis: Fig. 1",
+            "<a href=\"./x=1,y%20z/seed-1/report.html\">a &lt;run&gt;</a>",
+            "<a href=\"./javascript%3Aalert%281%29\">b</a>",
             "prefers-color-scheme:dark",
         ] {
             assert!(html.contains(part), "{part} is missing in\n{html}");

@@ -27,6 +27,8 @@ pub enum Ending {
     Diverged,
     /// Ctrl-C or another signal. Which one it was, only the program knows.
     Interrupted,
+    /// Of many networks one could not be finished: the code that it would have ended with alone.
+    Unfinished(u8),
 }
 
 impl Ending {
@@ -36,6 +38,7 @@ impl Ending {
             Self::Done => 0,
             Self::Diverged => 3,
             Self::Interrupted => 130,
+            Self::Unfinished(code) => code,
         }
     }
 }

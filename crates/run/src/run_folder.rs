@@ -16,6 +16,8 @@ pub const BEST: &str = "best.safetensors";
 pub const HISTORY: &str = "history.csv";
 /// Held while a process trains here.
 const LOCK: &str = "lock";
+/// How the names of claims begin: whoever works on one of many networks holds the folder by such a file, see the crate `scrnn-sweep`.
+pub const CLAIM: &str = "claim-";
 
 /// All that a training keeps there.
 pub const FILES: [&str; 5] = [EXPERIMENT, CHECKPOINT, BEST, HISTORY, LOCK];
@@ -53,6 +55,8 @@ impl RunFolder {
                     "wait for it or stop it, or choose another folder with --out",
                 ));
             }
+            // Some file systems have no locks. Then a claim keeps others out.
+            Err(TryLockError::Error(_)) if is_claimed(path) => {}
             Err(TryLockError::Error(error)) => return Err(Failure::disk("lock", &lock_path, error)),
         }
         files::sweep(path).map_err(|error| Failure::disk("remove half-written files in", path, error))?;
@@ -83,6 +87,12 @@ impl RunFolder {
             _ => Ok(()),
         }
     }
+}
+
+/// Whether somebody claims the folder, be it this process or another.
+fn is_claimed(path: &Path) -> bool {
+    let names = fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.file_name());
+    names.into_iter().any(|name| name.to_string_lossy().starts_with(CLAIM))
 }
 
 #[cfg(test)]

@@ -8,10 +8,10 @@ use crate::experiment::{Data, Experiment};
 use crate::failure::{Failure, Result};
 use crate::held_out;
 use scrnn_data::{Reading, Remark, read_all, suspicions};
-use scrnn_tasks::{Task, TaskName, make};
+use scrnn_tasks::{Task, TaskName, interact, make};
 
 /// Sequences in their own units.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Source {
     /// What is learned.
     pub data: Dataset,
@@ -34,7 +34,7 @@ impl Source {
 }
 
 /// The true variances of a task.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Truth {
     /// The task.
     pub task: TaskName,
@@ -66,6 +66,9 @@ pub fn load(data: &Data, threads: usize) -> Result<Source> {
                 demonstrations: demonstrations.clone(),
                 ..Source::of(tutor::dataset(&demonstrations)?)
             });
+        }
+        if let (TaskName::Interact, Some(left)) = (task, data.left) {
+            return Ok(Source::of(interact::drawn_while(left, size, seed, threads, |_| Ok::<_, Failure>(()))?));
         }
         let Task { data, variances, .. } = make(task, size, seed, threads)?;
         // The noise of a robot's sensors is not all that cannot be predicted, so the true variances are unknown.

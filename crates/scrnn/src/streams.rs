@@ -61,6 +61,8 @@ pub enum Purpose {
     ClosedLoopStarts = 19,
     /// The noise of a training's closed loops; index: the copy.
     ClosedLoopNoise = 20,
+    /// Random settings of a sweep; index: the draw.
+    SweepDraws = 21,
 }
 
 /// The generator of `purpose`.
@@ -117,7 +119,7 @@ mod tests {
 
     use super::*;
 
-    const PURPOSES: [Purpose; 20] = [
+    const PURPOSES: [Purpose; 21] = [
         Purpose::InitialWeights,
         Purpose::BatchMembers,
         Purpose::BatchOrder,
@@ -138,6 +140,7 @@ mod tests {
         Purpose::StudyTrials,
         Purpose::ClosedLoopStarts,
         Purpose::ClosedLoopNoise,
+        Purpose::SweepDraws,
     ];
 
     #[test]

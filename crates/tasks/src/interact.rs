@@ -3,9 +3,12 @@
 use scrnn::analysis::excursions::Side;
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::jobs::side_by_side;
+use scrnn::streams::Purpose;
 use scrnn_sim::error::{Error, Result};
 use scrnn_sim::interact::Film;
-use scrnn_sim::interact::{CHANNELS, InteractionOptions, SensorNoise, all_orders, letters, record, samples};
+use scrnn_sim::interact::{
+    CHANNELS, InteractionOptions, SensorNoise, all_orders, letters, random_order, record, samples,
+};
 use scrnn_sim::recording::RecordingError;
 
 use crate::Task;
@@ -59,6 +62,35 @@ pub fn make_while<E: From<Error> + Send>(
     Ok(Task { data, means, variances })
 }
 
+/// So many orders drawn at random, as many as there are by default: each branching goes to the left with this probability. An order may come
+/// twice; their numbers tell them apart. `begin` is as in [`make_while`].
+///
+/// # Errors
+/// As [`make_while`]; [`Error::Setting`] for what is no probability.
+pub fn drawn_while<E: From<Error> + Send>(
+    left: f64,
+    (sequences, steps): (usize, usize),
+    seed: u64,
+    threads: usize,
+    begin: impl Fn(usize) -> std::result::Result<(), E> + Sync,
+) -> std::result::Result<Dataset, E> {
+    let (_, longest) = size();
+    if sequences == 0 || steps == 0 || steps > longest || !(0.0..=1.0).contains(&left) {
+        let found = format!("{sequences} orders of {steps} samples, to the left with probability {left}");
+        let needed = "at least 1 order of 1 to 470 samples, and a probability from 0 to 1";
+        return Err(Error::Setting { what: "what is drawn for the task interact", found, needed }.into());
+    }
+    let options = InteractionOptions::default();
+    let rows = side_by_side(sequences, threads, |k, _| -> std::result::Result<Sequence, E> {
+        begin(k)?;
+        let order = random_order(BRANCHES, left, seed, Purpose::RecordingOrders, k as u64);
+        let mut sequence = record(&order, &options, (seed, k as u64), steps, |_, _| {})?;
+        sequence.name = format!("{} {}", sequence.name, k + 1);
+        Ok(sequence)
+    })?;
+    Ok(Dataset::new(CHANNELS.map(String::from).to_vec(), rows).map_err(Error::from)?)
+}
+
 /// An order as the sensors gave it, and without their noise.
 fn recorded(order: &[Side], seed: (u64, u64), steps: usize) -> Result<(Sequence, Sequence)> {
     let mut truth = Vec::new();
@@ -96,6 +128,17 @@ mod tests {
     #[test]
     fn the_size_that_is_refused_is_the_one_that_there_is() {
         assert_eq!(size(), (32, 470));
+    }
+
+    #[test]
+    fn drawn_orders_go_where_they_are_told_and_have_names_of_their_own() {
+        let drawn = |left, size| drawn_while::<Error>(left, size, 1, 2, |_| Ok(()));
+        let names = |data: &Dataset| data.sequences().iter().map(|one| one.name.clone()).collect::<Vec<_>>();
+        assert_eq!(names(&drawn(1.0, (2, 20)).unwrap()), ["LLLLL 1", "LLLLL 2"]);
+        assert_eq!(names(&drawn(0.0, (1, 20)).unwrap()), ["RRRRR 1"]);
+        for (left, size) in [(1.5, (1, 20)), (f64::NAN, (1, 20)), (0.5, (0, 20)), (0.5, (1, 471))] {
+            assert!(drawn(left, size).is_err(), "{left} {size:?}");
+        }
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! One file for each command.
 
+pub mod compare;
 pub mod completions;
 pub mod convert;
 pub mod data;
@@ -12,4 +13,5 @@ pub mod report;
 pub mod reproduce;
 pub mod schema;
 pub mod simulate;
+pub mod sweep;
 pub mod train;

@@ -37,11 +37,13 @@ from scrnn._scrnn import (
     __version__,
 )
 from scrnn._studies import Reproduced, Simulated, reproduce, simulate, studies
+from scrnn._sweeps import Compared, Swept, compare, sweep
 
 __all__ = [
     "SCTRNN",
     "SMTRNN",
     "Calibration",
+    "Compared",
     "Completed",
     "DataWarning",
     "DivergedError",
@@ -63,13 +65,16 @@ __all__ = [
     "Sequences",
     "Simulated",
     "Step",
+    "Swept",
     "Verdict",
     "__version__",
+    "compare",
     "load",
     "read",
     "reproduce",
     "simulate",
     "studies",
+    "sweep",
     "task",
     "train",
 ]

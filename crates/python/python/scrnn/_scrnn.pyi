@@ -34,6 +34,10 @@ __all__ = [
     "read",
     "write",
     "task",
+    "sweep_plan",
+    "sweep_run",
+    "sweep_status",
+    "compare",
     "studies",
     "reproduce",
     "simulate_reach",
@@ -300,6 +304,10 @@ def task(
     threads: int = ...,
 ) -> tuple[_Given, _Given | None]: ...
 def studies() -> list[tuple[str, str]]: ...
+def sweep_plan(path: str, *, out: str | None = ..., say: _Say | None = ...) -> tuple[str, list[int]]: ...
+def sweep_run(path: str, out: str, place: int, *, threads: int = ..., stale: float = ...) -> str: ...
+def sweep_status(folder: str) -> tuple[str, str]: ...
+def compare(paths: Sequence[str], out: str) -> tuple[str, str]: ...
 def reproduce(
     name: str,
     *,

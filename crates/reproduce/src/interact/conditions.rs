@@ -2,13 +2,9 @@
 
 use std::path::Path;
 
-use scrnn::dataset::{Dataset, Sequence};
-use scrnn::jobs::side_by_side;
-use scrnn::streams::Purpose;
 use scrnn_data::{self as files, Field};
 use scrnn_run::experiment::{Data, Experiment, ScalingChoice, ScalingName};
-use scrnn_sim::interact::{CHANNELS, InteractionOptions, random_order, record};
-use scrnn_tasks::interact::{self, BRANCHES};
+use scrnn_tasks::interact;
 
 use crate::framework::options::Options;
 use crate::framework::preset::asset;
@@ -114,25 +110,10 @@ impl Setting {
         let begin = |k: usize| desk.at(|| format!("{}: recording {} of {sequences}", self.condition.label, k + 1));
         let data = match self.left {
             None => interact::make_while((sequences, steps), seed, threads, begin)?.data,
-            Some(left) => drawn(left, seed, threads, begin)?,
+            Some(left) => interact::drawn_while(left, (sequences, steps), seed, threads, begin)?,
         };
         Ok(files::write(&path, &[Field { name: "", data: &data }])?)
     }
-}
-
-/// As many orders as there are, drawn at random.
-fn drawn(left: f64, seed: u64, threads: usize, begin: impl Fn(usize) -> Result<()> + Sync) -> Result<Dataset> {
-    let (sequences, steps) = interact::size();
-    let options = InteractionOptions::default();
-    let rows = side_by_side(sequences, threads, |k, _| -> Result<Sequence> {
-        begin(k)?;
-        let order = random_order(BRANCHES, left, seed, Purpose::RecordingOrders, k as u64);
-        let mut sequence = record(&order, &options, (seed, k as u64), steps, |_, _| {})?;
-        // An order may come twice; a table tells sequences apart by their names.
-        sequence.name = format!("{} {}", sequence.name, k + 1);
-        Ok(sequence)
-    })?;
-    Ok(Dataset::new(CHANNELS.map(String::from).to_vec(), rows)?)
 }
 
 #[cfg(test)]
@@ -160,6 +141,54 @@ mod tests {
         assert_eq!(experiment(&ALL[3]).network.initial_state_variance, 1e-3);
         assert_eq!(experiment(&ALL[6]).data.files, Some(vec!["/place/recordings-80-left.csv".into()]));
         assert!(ALL.iter().all(|one| setting(one.condition.key).condition.label == one.condition.label));
+    }
+
+    /// The sweep that ships comes to the bytes of the study's checkpoints, but for names and for where the data lie.
+    #[test]
+    fn the_sweep_of_the_seven_conditions_comes_to_the_same_checkpoints() {
+        use scrnn::checkpoint::Checkpoint;
+        use scrnn_run::interrupt::Interrupt;
+        use scrnn_run::messages::Silent;
+        use scrnn_run::training::{Found, train};
+        use scrnn_sweep::file::SweepFile;
+        use scrnn_sweep::plan::Plan;
+
+        let place = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/sweeps/interaction.toml");
+        let mut file = SweepFile::read(&place).unwrap();
+        // In short: three orders of 60 samples, five epochs.
+        for (key, value) in [("training.epochs", 5), ("data.sequences", 3), ("data.steps", 60)] {
+            file.set.insert(key.to_owned(), toml::Value::Integer(value));
+        }
+        let plan = Plan::of(file, place).unwrap();
+        assert_eq!((plan.settings.len(), plan.runs.len()), (7, 21));
+        let folder = tempfile::tempdir().unwrap();
+        // As `record` makes them, in short.
+        let size = (3, 60);
+        let all = interact::make(size, 1, 2).unwrap().data;
+        let left = interact::drawn_while::<scrnn_sim::error::Error>(0.8, size, 1, 2, |_| Ok(())).unwrap();
+        for (setting, data) in [(&ALL[0], &all), (&ALL[5], &left)] {
+            files::write(&folder.path().join(setting.file()), &[Field { name: "", data }]).unwrap();
+        }
+        let seed = 2;
+        let checkpoint = |experiment: &Experiment, name: &str| {
+            let run = folder.path().join(name);
+            let engine = scrnn::engine::Engine::serial();
+            let asked = (&engine, &Interrupt::new());
+            train(experiment, (&run, Found::Refuse), asked, Box::new(Silent), &Silent).unwrap();
+            let file = files::read_bytes(&run.join("checkpoint.safetensors")).unwrap();
+            let mut checkpoint = Checkpoint::from_bytes(&file).unwrap();
+            checkpoint.notes["experiment"]["name"] = "one".into();
+            checkpoint.notes["experiment"]["data"] = "these".into();
+            checkpoint.to_bytes().unwrap()
+        };
+        for (setting, planned) in ALL.iter().zip(&plan.settings) {
+            let key = setting.condition.key;
+            assert_eq!(planned.name, key);
+            let run = plan.runs.iter().find(|run| run.folder == format!("{key}/seed-{seed}")).unwrap();
+            let swept = checkpoint(&plan.experiment(run).unwrap(), &format!("swept-{key}"));
+            let study = setting.experiment(folder.path(), seed, &options(Preset::Fast, Some(5))).unwrap();
+            assert!(swept == checkpoint(&study, &format!("study-{key}")), "{key}");
+        }
     }
 
     #[test]

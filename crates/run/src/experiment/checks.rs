@@ -142,6 +142,12 @@ fn check_data(data: &Data) -> Check {
         let message = "`data.exact_positions` is given without the task \"reach\"";
         return complaint(&["data", "exact_positions"], message, "leave it out");
     }
+    if let Some(left) = data.left {
+        if data.task != Some(TaskName::Interact) {
+            return complaint(&["data", "left"], "`data.left` is given without the task \"interact\"", "leave it out");
+        }
+        must((0.0..=1.0).contains(&left), &["data", "left"], left, "a probability from 0 to 1")?;
+    }
     must(data.sequences != Some(0), &["data", "sequences"], 0, "at least 1")?;
     must(data.steps != Some(0), &["data", "steps"], 0, "at least 1 more than the delay")?;
     let (sequences, steps) = (data.sequences.unwrap_or(1), data.steps.unwrap_or(1));

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 pub use comments::{Comment, in_lines};
 pub use difference::{Difference, differences};
 pub use overrides::Override;
-pub use reading::{read, read_text};
+pub use reading::{Base, read, read_text, table};
 pub use scrnn::learning::{Adam, AdaptiveRate, ClosedLoop, Lbfgs, Momentum, OnDivergence, PriorStep};
 pub use scrnn::topology::Group;
 pub use scrnn_tasks::TaskName;
@@ -77,6 +77,10 @@ pub struct Data {
     /// off for each sequence. Default false.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exact_positions: Option<bool>,
+    /// For the task "interact": orders are drawn at random, and a branching goes to the left with this probability. Default: all 32 orders,
+    /// each once.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub left: Option<f64>,
     /// Files and folders to read, relative to the experiment file; `*` stands for any part of a name. The sequences of all of
     /// them are learned together.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -47,6 +47,51 @@ pub fn read_text(name: &str, text: &str, overrides: &[Override]) -> Result<Exper
     Ok(experiment)
 }
 
+/// An experiment file that many sets of changes are applied to, each to the file as it is: see the crate `scrnn-sweep`.
+#[derive(Debug, Clone)]
+pub struct Base {
+    name: String,
+    text: String,
+    table: Table,
+}
+
+impl Base {
+    /// The experiment in `text`, which stands in a file called `name`. What it lacks may come with the changes.
+    ///
+    /// # Errors
+    /// [`Failure::Input`] for what is no TOML.
+    pub fn new(name: impl Into<String>, text: impl Into<String>) -> Result<Self> {
+        let (name, text) = (name.into(), text.into());
+        let table = table(&name, &text)?;
+        Ok(Self { name, text, table })
+    }
+
+    /// The same as [`read_text`] gives, and quickly: the file is not read again.
+    ///
+    /// # Errors
+    /// As [`read_text`].
+    pub fn with(&self, overrides: &[Override]) -> Result<Experiment> {
+        let mut table = self.table.clone();
+        if overrides.iter().all(|change| change.apply(&mut table).is_ok())
+            && let Ok(experiment) = Experiment::deserialize(table)
+            && no_effect(&experiment, overrides).is_ok()
+            && checks::check(&experiment).is_ok()
+        {
+            return Ok(experiment);
+        }
+        // What is wrong is shown in its place.
+        read_text(&self.name, &self.text, overrides)
+    }
+}
+
+/// The TOML of a file called `name`, as any type; whatever is wrong is shown at its place, with the names that come near.
+///
+/// # Errors
+/// [`Failure::Input`].
+pub fn table<T: serde::de::DeserializeOwned>(name: &str, text: &str) -> Result<T> {
+    toml::from_str(text).map_err(|error| bad_toml(&error, (name, text)))
+}
+
 /// What the TOML reader says, with a caret under the place.
 fn bad_toml(error: &toml::de::Error, source: (&str, &str)) -> Failure {
     let help = near_names(error.message()).unwrap_or_else(|| "`scrnn schema` prints what the file may hold".to_owned());

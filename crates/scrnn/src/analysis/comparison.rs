@@ -5,6 +5,7 @@
 //! Welch:   t = (mean(a) - mean(b)) / sqrt(s_a + s_b),  s = var / n,
 //!          (s_a + s_b)^2 / (s_a^2 / (n_a - 1) + s_b^2 / (n_b - 1)) degrees of freedom
 //! equal:   both t-tests against -margin and +margin reject (two one-sided tests, Schuirmann 1987)
+//! Holm:    of m tests, in the order of their p, the k-th is taken as max over j <= k of (m - j + 1) p_j   (Holm 1979)
 //! ```
 //!
 //! Student's distribution comes from the incomplete beta function, which is that of the crate `statrs`.
@@ -76,6 +77,21 @@ impl TTest {
     }
 }
 
+/// The p of several tests, each as large as it has to be so that one of them is below 0.05 by chance in 5 % of all cases at most. NaN
+/// stays NaN, and does not count.
+#[must_use]
+pub fn holm(p: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..p.len()).filter(|&k| !p[k].is_nan()).collect();
+    order.sort_by(|&a, &b| p[a].total_cmp(&p[b]));
+    let mut corrected = vec![f64::NAN; p.len()];
+    let mut largest = 0.0_f64;
+    for (rank, &k) in order.iter().enumerate() {
+        largest = largest.max((order.len() - rank) as f64 * p[k]).min(1.0);
+        corrected[k] = largest;
+    }
+    corrected
+}
+
 /// A distance in standard errors.
 fn against(distance: f64, error: f64) -> f64 {
     if distance == 0.0 { 0.0 } else { distance / error }
@@ -135,6 +151,17 @@ mod tests {
         assert_eq!(TTest::paired(&[1.0], &[2.0]), None);
         assert_eq!(TTest::paired(&[1.0, 2.0], &[2.0]), None);
         assert_eq!(TTest::welch(&[1.0], &[2.0, 3.0]), None);
+    }
+
+    #[test]
+    fn several_tests_are_corrected_by_hand() {
+        // 4 x 0.01, 3 x 0.02, 2 x 0.04, and 0.03 may not be below its forerunner.
+        let corrected = holm(&[0.04, 0.01, f64::NAN, 0.02, 0.03]);
+        let expected = [0.06, 0.04, f64::NAN, 0.06, 0.06];
+        for (found, expected) in corrected.iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-15 || found.is_nan() && expected.is_nan(), "{corrected:?}");
+        }
+        assert_eq!((holm(&[0.9, 0.8]), holm(&[])), (vec![1.0, 1.0], vec![]));
     }
 
     #[test]

@@ -1,0 +1,88 @@
+//! `scrnn compare` from outside: what the page and the table say, and how large they get.
+
+use std::fs;
+use std::time::{Duration, Instant};
+
+use crate::{Place, SINE};
+
+fn sine(epochs: u32) -> String {
+    SINE.replace("epochs = 1500", &format!("epochs = {epochs}"))
+}
+
+#[test]
+fn one_knob_is_a_curve_two_are_a_heat_map_and_the_best_is_named_over_all_seeds() {
+    let place = Place::new(&sine(150), "seeds = 3\n[grid]\n\"training.adam.rate\" = [1e-6, 1e-3, 1e-2]\n");
+    place.ends(0, "sweep s.toml --quiet");
+    let best = place.json("compare runs/s --json");
+    assert_eq!((best["measure"].as_str(), best["setting"].as_str()), (Some("nll"), Some("rate=0.01")), "{best}");
+    let html = fs::read_to_string(place.path("runs/s/report.html")).unwrap();
+    for part in [
+        "Over all seeds the best setting is rate=0.01",
+        "log10 of training.adam.rate",
+        "one sd over seeds",
+        "Learning curves",
+        "Closed loops",
+        "Initial states",
+        "rate=0.01 against rate=1e-6",
+        "Holm",
+        "href=\"./rate=1e-3/seed-2/report.html\"",
+    ] {
+        assert!(html.contains(part), "{part} is missing");
+    }
+    let csv = fs::read_to_string(place.path("runs/s/metrics.csv")).unwrap();
+    assert!(csv.starts_with("run,setting,training.adam.rate,seed,outcome,nll,mse,"), "{csv}");
+    assert_eq!(csv.lines().count(), 10);
+    // Any runs: what differs between their experiments makes the settings.
+    let err = place.ends(2, "compare runs/s/rate=1e-3/seed-1 runs/s/rate=0.01/seed-1").1;
+    assert!(err.contains("--out DIR"), "{err}");
+    let runs = ["rate=1e-3/seed-1", "rate=1e-3/seed-2", "rate=0.01/seed-1", "rate=0.01/seed-2"]
+        .map(|run| format!("runs/s/{run}"));
+    let best = place.json(&format!("compare {} --out page --json", runs.join(" ")));
+    assert_eq!(best["setting"].as_str(), Some("rate=0.01"), "{best}");
+    let html = fs::read_to_string(place.path("page/report.html")).unwrap();
+    assert!(
+        html.contains("that differ in training.adam.rate") && html.contains("../runs/s/rate=0.01/seed-2/report.html")
+    );
+
+    let sweep = "[grid]\n\"training.adam.rate\" = [1e-3, 1e-2]\n\"network.groups.context.units\" = [3, 4, 5]\n[then]\nreport = false\n";
+    let place = Place::new(&sine(40), sweep);
+    place.ends(0, "sweep s.toml --quiet");
+    place.ends(0, "compare runs/s");
+    let html = fs::read_to_string(place.path("runs/s/report.html")).unwrap();
+    assert!(html.contains("the stronger the colour, the better") && html.contains("opacity=\"0.55\""));
+    assert!(html.contains("Each setting has one network only") && html.contains("No run has a page of its own"));
+}
+
+#[test]
+fn a_page_of_a_thousand_networks_is_small_and_made_in_no_time() {
+    let sweep =
+        "seeds = 10\n[grid]\n\"training.adam.rate\" = { from = 1e-4, to = 1e-1, count = 100, scale = \"log\" }\n";
+    let place = Place::new(&sine(200), sweep);
+    let plan = place.ends(0, "sweep s.toml --dry-run --json").0;
+    fs::create_dir_all(place.path("runs/s")).unwrap();
+    fs::write(place.path("runs/s/plan.json"), plan).unwrap();
+    // One network stands for all: what a page shows does not depend on how long they learned.
+    place.ends(0, "train sine.toml --out one --quiet");
+    for (k, run) in place.runs("runs/s").iter().enumerate() {
+        let folder = place.path("runs/s").join(run);
+        fs::create_dir_all(&folder).unwrap();
+        for name in ["checkpoint.safetensors", "history.csv"] {
+            fs::copy(place.path("one").join(name), folder.join(name)).unwrap();
+        }
+        fs::write(folder.join("report.html"), "").unwrap();
+        let value = (k * 7919 % 1000) as f64 / 1000.0;
+        let text = format!(
+            "{{\"format\":1,\"outcome\":\"finished\",\"decided_by\":\"\",\"measures\":{{\"nll\":{value},\"mse\":{value},\"best.nll\":{value},\"epoch\":200}}}}"
+        );
+        fs::write(folder.join("outcome.json"), text).unwrap();
+    }
+    let begun = Instant::now();
+    place.ends(0, "compare runs/s");
+    let taken = begun.elapsed();
+    let size = fs::metadata(place.path("runs/s/report.html")).unwrap().len();
+    assert!(size < 5_000_000, "{size} bytes");
+    assert!(taken < Duration::from_secs(60), "{taken:?}");
+    let html = fs::read_to_string(place.path("runs/s/report.html")).unwrap();
+    assert_eq!(html.matches("/report.html\">").count(), 1000);
+    assert_eq!(fs::read_to_string(place.path("runs/s/metrics.csv")).unwrap().lines().count(), 1001);
+}
