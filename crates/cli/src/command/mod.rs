@@ -13,3 +13,4 @@ pub mod reproduce;
 pub mod schema;
 pub mod simulate;
 pub mod train;
+pub mod view;

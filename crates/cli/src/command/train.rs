@@ -10,6 +10,7 @@ use crate::args::{MOST_IN_TOML, Part, Shared, whole};
 use crate::output;
 use crate::progress::Bars;
 use crate::signals::Signals;
+use scrnn_pages::live::Live;
 use scrnn_run::experiment::{Experiment, Override};
 use scrnn_run::failure::{Ending, Failure, Result};
 use scrnn_run::interrupt::Interrupt;
@@ -63,6 +64,9 @@ pub struct Arguments {
     /// Replace a value of the experiment, e.g. training.adam.rate=0.001 or network.groups.context.units=20
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<Override>,
+    /// Serve a page on this machine that shows the training as it goes on, at this port or any that is free
+    #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "0", require_equals = true)]
+    watch: Option<u16>,
     /// Print the result as a JSON object
     #[arg(long)]
     json: bool,
@@ -106,6 +110,9 @@ pub fn run(arguments: &Arguments, (shared, signals): (&Shared, &Signals)) -> Res
         Found::Refuse
     };
     if mixture {
+        if arguments.watch.is_some() {
+            return Err(Failure::input("--watch shows one training, and this is a mixture", "train without --watch"));
+        }
         return train_mixture(&experiment, (&path, found), (shared, &engine, &interrupt), arguments.json);
     }
     if !members::folders(&path).is_empty() {
@@ -116,7 +123,15 @@ pub fn run(arguments: &Arguments, (shared, signals): (&Shared, &Signals)) -> Res
         Some(source) => source,
         None => source::load(&experiment.data, engine.threads())?,
     };
-    let progress = Bars::new(shared.quiet).bar("", experiment.training.epochs);
+    let mut progress = Bars::new(shared.quiet).bar("", experiment.training.epochs);
+    let live = arguments.watch.map(|port| {
+        Live::start(port, (&experiment.name, experiment.training.epochs), path.clone(), &source.data)
+    });
+    let live = live.transpose()?;
+    if let Some(live) = &live {
+        output::say(format_args!("watch it at {}", live.url()));
+        progress = live.watching(progress);
+    }
     let training = train_on(&experiment, source, (&path, found), (&engine, &interrupt), progress, shared)?;
     let verdict = Verdict::new(&training, &engine)?;
     if arguments.json {

@@ -35,7 +35,14 @@ fn dots(title: &str, values: &[f64], high: f64) -> Panel {
         Series::line("mean", Tone::Ink, vec![(0.5, mean), (n + 0.5, mean)]),
         Series::dots("a network", Tone::Ours, points),
     ];
-    Panel { title: format!("{title}: {mean:.1}"), x: (0.0, n + 1.0), y: (0.0, high), series, failed: false }
+    Panel {
+        title: format!("{title}: {mean:.1}"),
+        x: (0.0, n + 1.0),
+        y: (0.0, high),
+        series,
+        failed: false,
+        equal: false,
+    }
 }
 
 fn bars(file: &str, title: &str, thesis: &str, panels: Vec<(&str, Vec<f64>)>) -> Block {

@@ -164,6 +164,7 @@ fn phase_plots(material: &Material) -> Block {
                     y: (0.0, 1.0),
                     series: Vec::new(),
                     failed: false,
+                    equal: false,
                 });
                 continue;
             }
