@@ -4,6 +4,7 @@
 //! It needs what tests/browser.rs needs, and the packages of tests/python/requirements.txt. Without them the tests say that they were
 //! skipped.
 
+use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -73,7 +74,11 @@ fn the_step_in_script_computes_what_the_library_computes_for_every_kind_of_netwo
         // While samples come; and with 15 steps where none come, in which some of these networks double any error at each step.
         for (steps, most) in [(BLIND.start, 1e-9), (STEPS, 1e-6)] {
             let (of_means, of_variances) = greatest_difference(variant, &mean, &variance, steps);
-            assert!(of_means <= most && of_variances <= most, "{}, {steps} steps: {of_means:e}, {of_variances:e}", variant.name);
+            assert!(
+                of_means <= most && of_variances <= most,
+                "{}, {steps} steps: {of_means:e}, {of_variances:e}",
+                variant.name
+            );
         }
     }
 }
@@ -122,4 +127,52 @@ fn a_recording_is_played_to_its_end_and_its_hand_is_where_the_recording_has_it()
     let size = numbers(&found["canvas"]);
     assert!((0.0..size[0]).contains(&drawn[0]) && (0.0..size[1]).contains(&drawn[1]), "{found}");
     assert_eq!((&found["turned"], &found["curves"]), (&json!(true), &json!(6)), "{found}");
+}
+
+/// A training that is ended when the test is over, however it ends.
+struct Training(std::process::Child);
+
+impl Drop for Training {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[test]
+fn a_training_is_watched_live_and_learns_what_it_would_learn_unwatched() {
+    let folder = tempfile::tempdir().unwrap();
+    let experiment = root().join("assets/experiments/lissajous_fast.toml").display().to_string();
+    let line = format!("train {experiment} --epochs 200 --out");
+    scrnn(folder.path(), &format!("{line} plain"));
+    scrnn(folder.path(), &format!("{line} watched --watch"));
+    let [plain, watched] =
+        ["plain", "watched"].map(|run| scrnn(folder.path(), &format!("generate {run} --seed 3 --json")));
+    assert!(plain == watched, "the page changed what was learned");
+
+    let mut command = Command::new(env!("CARGO_BIN_EXE_scrnn"));
+    command.current_dir(folder.path()).stderr(std::process::Stdio::piped()).stdout(std::process::Stdio::null());
+    let line = format!("train {experiment} --epochs 1000000 --out live --watch --set output.checkpoint_seconds=1");
+    let mut training = Training(command.args(line.split_whitespace()).spawn().unwrap());
+    let mut said = BufReader::new(training.0.stderr.take().unwrap());
+    let mut first = String::new();
+    said.read_line(&mut first).unwrap();
+    let url = first.trim().strip_prefix("watch it at ").unwrap_or_else(|| panic!("{first}")).to_owned();
+    // Somebody has to read what it says.
+    std::thread::spawn(move || std::io::copy(&mut said, &mut std::io::sink()));
+
+    let address = url.trim_start_matches("http://").trim_end_matches('/');
+    let mut stream = std::net::TcpStream::connect(address).unwrap();
+    stream.write_all(b"GET /data.json HTTP/1.1\r\nHost: elsewhere.example\r\n\r\n").unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    assert!(answer.starts_with("HTTP/1.1 403 ") && !answer.contains("lissajous"), "{answer}");
+
+    let Some(found) = used(folder.path(), &["live", &url]) else { return };
+    assert!(found["points"].as_f64().unwrap() > 2.0 && found["loops"].as_f64().unwrap() >= 2.0, "{found}");
+    assert!(
+        found["stand"].as_str().unwrap().contains("of 1000000") && found["back"].as_str().unwrap().contains("left")
+    );
+    assert!(found["lost"].as_str().unwrap().contains("does not answer"), "{found}");
+    assert_eq!(found["foreign"], json!([]), "no request goes elsewhere");
 }

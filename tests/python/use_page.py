@@ -2,6 +2,7 @@
 
     use_page.py step STEP.js FOLDER...      runs network.json of each folder along its samples.json, into browser.json
     use_page.py drag PAGE                   drags the initial state, then runs every learned state without noise
+    use_page.py live URL                    watches a training: what is drawn, and who is answered
     use_page.py view PAGE RECORDING BODY    plays the page to its end; where the body is drawn, and where the recording has it
 
 The browser is found as look_at_page.py finds it; without one the code is 3. A request, an error or a word on the console ends with 1.
@@ -21,10 +22,20 @@ def opened(browser, file, problems):
     page = browser.new_page(viewport={"width": 1000, "height": 900})
     url = file.resolve().as_uri()
     page.on("request", lambda request: None if request.url == url or request.url.startswith("data:") else problems.append(request.url))
-    page.on("console", lambda message: problems.append(f"console: {message.text}"))
+    # A test that reads pixels makes a driver say that this is slow.
+    page.on("console", lambda message: None if "GL Driver Message" in message.text else problems.append(f"console: {message.text}"))
     page.on("pageerror", lambda error: problems.append(f"error: {error}"))
     page.goto(url)
     return page
+
+
+def wait(page, condition, seconds=120):
+    """Until something holds; the page's policy forbids the browser's own way."""
+    for _ in range(10 * seconds):
+        if page.evaluate(condition):
+            return
+        page.wait_for_timeout(100)
+    raise TimeoutError(condition)
 
 
 def step(browser, script, folders):
@@ -94,7 +105,7 @@ def view(browser, file, recording, body, problems):
     page = opened(browser, file, problems)
     page.locator("#view .speed").select_option("20")
     page.locator("#view .play").click()
-    page.wait_for_function("!scrnnView.playing() && scrnnView.time() >= scrnnView.data.length", timeout=120_000)
+    wait(page, "!scrnnView.playing() && scrnnView.time() >= scrnnView.data.length")
     form, spheres, place = place_at_the_end(recording, body)
     projected = page.evaluate("place => scrnnView.project(place)", place)
     # Of a body's pieces the first is measured, alone.
@@ -122,6 +133,29 @@ def view(browser, file, recording, body, problems):
     }
 
 
+def live(browser, url, problems):
+    page = browser.new_page()
+    asked = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.on("pageerror", lambda error: problems.append(f"error: {error}"))
+    page.goto(url)
+    drawn = "(name) => document.querySelectorAll('#live ' + name).length"
+    wait(page, "scrnnLive.polls >= 3 && document.querySelectorAll('#live .loops svg').length > 0")
+    points = page.evaluate("document.querySelector('#live .curve .ours').getAttribute('points').split(' ').length")
+    stand = page.locator("#live .stand").inner_text()
+    # The connection is lost, and comes back.
+    page.context.set_offline(True)
+    wait(page, "scrnnLive.failed > 0")
+    lost = page.locator("#live .stand").inner_text()
+    page.context.set_offline(False)
+    polls = page.evaluate("scrnnLive.polls")
+    wait(page, f"scrnnLive.polls > {polls}")
+    return {
+        "points": points, "stand": stand, "lost": lost, "back": page.locator("#live .stand").inner_text(), "loops": page.evaluate(drawn, ".loops svg"),
+        "foreign": [one for one in asked if not one.startswith(url) and not one.startswith("data:")],
+    }
+
+
 def main():
     problems = []
     with sync_playwright() as playwright:
@@ -130,6 +164,8 @@ def main():
             result = step(browser, sys.argv[2], sys.argv[3:])
         elif sys.argv[1] == "drag":
             result = drag(browser, pathlib.Path(sys.argv[2]), problems)
+        elif sys.argv[1] == "live":
+            result = live(browser, sys.argv[2], problems)
         else:
             result = view(browser, pathlib.Path(sys.argv[2]), sys.argv[3], sys.argv[4], problems)
         browser.close()

@@ -15,6 +15,7 @@ use scrnn_run::trained::Trained;
 
 use crate::args::Shared;
 use crate::output;
+use crate::progress::Busy;
 
 /// Write a page about a training run: how it learned, how it predicts, how it runs on its own
 ///
@@ -83,6 +84,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         return Err(Failure::input(message, "give the folder that `scrnn train` wrote"));
     }
     let engine = shared.engine()?;
+    let busy = Busy::with("running the network", shared.quiet);
     let folders = members::folders(&arguments.run);
     if !folders.is_empty() {
         let all = members::open(&arguments.run, arguments.best)?;
@@ -91,13 +93,17 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         for folder in &folders {
             rows.push(history::read(&folder.join(HISTORY))?);
         }
-        return finish(arguments, &mixture_page(&all, &rows, &engine)?);
+        let page = mixture_page(&all, &rows, &engine)?;
+        drop(busy);
+        return finish(arguments, &page);
     }
     let trained = Trained::open(&arguments.run, arguments.best)?;
     shared.say_of(&trained);
     let source = trained.source(engine.threads())?;
     let rows = history::read(&arguments.run.join(HISTORY))?;
-    finish(arguments, &page(&trained, &source, &rows, arguments.seed, &engine)?)
+    let page = page(&trained, &source, &rows, arguments.seed, &engine)?;
+    drop(busy);
+    finish(arguments, &page)
 }
 
 fn finish(arguments: &Arguments, page: &Page) -> Result<Ending> {

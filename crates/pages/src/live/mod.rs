@@ -123,7 +123,10 @@ impl Live {
             _ => None,
         };
         let server = Server::start(port, Box::new(answer)).map_err(|error| {
-            Failure::input(format!("nothing can be served on port {port}: {error}"), "give another, or 0 for any that is free")
+            Failure::input(
+                format!("nothing can be served on port {port}: {error}"),
+                "give another, or 0 for any that is free",
+            )
         })?;
         Ok(Self { state, server })
     }
@@ -194,7 +197,8 @@ impl Progress for Watched {
 
 impl State {
     fn json(&self) -> Value {
-        let passed = self.begun.map(|(first, at)| ((self.epoch - first.min(self.epoch)) as f64, at.elapsed().as_secs_f64()));
+        let passed =
+            self.begun.map(|(first, at)| ((self.epoch - first.min(self.epoch)) as f64, at.elapsed().as_secs_f64()));
         let speed = passed.map(|(epochs, seconds)| epochs / seconds.max(1e-9)).filter(|speed| *speed > 0.0);
         json!({
             "name": self.name, "epochs": self.epochs, "epoch": self.epoch, "finished": self.finished,
@@ -267,7 +271,8 @@ impl Loops {
         let one = |(sequence, own): (&Sequence, &scrnn::generation::Generated)| {
             let channel = |i: usize| {
                 let known = |value: f64| if value.is_finite() { json!(value) } else { Value::Null };
-                let recorded = sequence.values().iter().skip(i).step_by(n).take(LOOPS.1 + delay).map(|&value| known(value));
+                let recorded =
+                    sequence.values().iter().skip(i).step_by(n).take(LOOPS.1 + delay).map(|&value| known(value));
                 let own = own.sample.iter().skip(i).step_by(n).map(|&value| known(checkpoint.scaling.to_raw(i, value)));
                 json!({ "recorded": recorded.collect::<Vec<_>>(), "own": own.collect::<Vec<_>>() })
             };

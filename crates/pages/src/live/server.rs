@@ -133,7 +133,8 @@ fn judged(head: &[u8], port: u16) -> Result<&str, &'static str> {
     let mut lines = text.split("\r\n");
     let mut first = lines.next().unwrap_or_default().split(' ');
     let (method, target, version) = (first.next(), first.next(), first.next());
-    let (Some(method), Some(target), Some("HTTP/1.1" | "HTTP/1.0"), None) = (method, target, version, first.next()) else {
+    let (Some(method), Some(target), Some("HTTP/1.1" | "HTTP/1.0"), None) = (method, target, version, first.next())
+    else {
         return Err(BAD);
     };
     let hosts: Vec<&str> = lines
@@ -143,7 +144,8 @@ fn judged(head: &[u8], port: u16) -> Result<&str, &'static str> {
         .collect();
     let known = |host: &str| {
         ["127.0.0.1", "localhost", "[::1]"].iter().any(|name| {
-            host.strip_prefix(name).is_some_and(|rest| rest.strip_prefix(':').and_then(|rest| rest.parse().ok()) == Some(port))
+            host.strip_prefix(name)
+                .is_some_and(|rest| rest.strip_prefix(':').and_then(|rest| rest.parse().ok()) == Some(port))
         })
     };
     match hosts[..] {

@@ -127,9 +127,7 @@ impl From<ViewError> for Failure {
     fn from(error: ViewError) -> Self {
         match error {
             ViewError::File(error) => error.into(),
-            ViewError::Robot(why) => {
-                Self::input(format!("the robot's description cannot be read: {why}"), "give a URDF file to --urdf")
-            }
+            ViewError::Robot(why) => Self::input(why, "give a URDF file to --urdf"),
             ViewError::Nothing { path } => Self::input(
                 format!("{path} holds nothing to show"),
                 "needed: foxglove.SceneUpdate, joint states, or the topic /sensed; `scrnn inspect` lists what it holds",
