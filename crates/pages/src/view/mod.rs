@@ -177,7 +177,7 @@ impl Story {
             }
             "/events" => {
                 let values = value["values"].as_object().into_iter().flatten();
-                let values: Vec<String> = values.map(|(key, value)| format!("{key} {value}")).collect();
+                let values: Vec<String> = values.map(|(key, value)| format!("{key} {}", digits(value))).collect();
                 self.events.push((time, format!("{} {}", named(value), values.join(", ")).trim().to_owned()));
             }
             _ => {
@@ -259,7 +259,8 @@ impl Story {
             name: "view".into(),
             title: "The recording".into(),
             caption: "Drag to turn, wheel or two fingers to come nearer, right button or shift to move; space plays. Below: what was sensed \
-                      (dashed), what the network expected (line) and two of its standard deviations (band). Marks under the time bar are \
+                      (dashed), what the network expected (line) and two of its standard deviations (band), at the time at which it is written: in recordings \
+                      of reaching an expectation is of the next sample. Marks under the time bar are \
                       events, contacts and the begins of sequences; a click into a curve goes there."
                 .into(),
             body: BODY.into(),
@@ -278,6 +279,18 @@ impl Story {
     }
 }
 
+/// A number with as many digits as one can take in.
+fn digits(value: &Value) -> String {
+    match value.as_f64() {
+        Some(number) if number != 0.0 => {
+            let places = (3 - number.abs().log10().floor() as i32).clamp(0, 9) as usize;
+            let text = format!("{number:.places$}");
+            if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+        }
+        _ => value.to_string(),
+    }
+}
+
 /// Name and position of each joint, whether they are a list of objects or lists side by side.
 fn joint_state(value: &Value) -> Vec<(String, f64)> {
     if let Some(joints) = value["joints"].as_array() {
@@ -293,4 +306,20 @@ fn joint_state(value: &Value) -> Vec<(String, f64)> {
 fn by_channel(value: &Value) -> impl Iterator<Item = (&str, f64)> {
     let entries = value.as_object().into_iter().flatten();
     entries.filter_map(|(name, value)| Some((name.as_str(), value.as_f64()?)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_of_events_are_short_and_joint_states_are_read_in_both_forms() {
+        let all = [json!(0.004_971_584), json!(2.0), json!(0), json!(12_345.678)].map(|value| digits(&value));
+        assert_eq!(all, ["0.004972", "2", "0", "12346"]);
+        let foxglove = json!({ "joints": [{ "name": "a", "position": 0.5 }, { "name": "b" }] });
+        let ros = json!({ "name": ["a", "b"], "position": [0.5, 1.5], "velocity": [] });
+        assert_eq!(joint_state(&foxglove), [("a".to_owned(), 0.5)]);
+        assert_eq!(joint_state(&ros), [("a".to_owned(), 0.5), ("b".to_owned(), 1.5)]);
+        assert_eq!(by_channel(&json!({ "timestamp": { "sec": 1 }, "x": 2.0 })).collect::<Vec<_>>(), [("x", 2.0)]);
+    }
 }

@@ -15,6 +15,11 @@ pub fn sections(results: &Results<Findings>, materials: &[&Material]) -> Vec<Sec
                 Block::Figure(Box::new(figures::initial_states(materials))),
                 Block::Figure(Box::new(figures::on_its_own(materials))),
                 Block::Figure(Box::new(figures::in_world(materials))),
+                Block::Text(
+                    "To see both robots at work, in 3-D, type this in the folder of this page and open interact.html: \
+                     scrnn simulate interact wide-1 --best --ers --view interact.html"
+                        .into(),
+                ),
             ],
         },
         reactions(results),
