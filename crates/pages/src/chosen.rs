@@ -2,8 +2,8 @@
 
 use scrnn_run::evaluation::labels::label;
 
-/// Sequences that are drawn.
-pub const MOST: usize = 12;
+/// Sequences that are drawn where there is room for many.
+pub const MANY: usize = 12;
 
 /// Some of a run's sequences.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -14,20 +14,21 @@ pub struct Chosen {
     pub words: String,
 }
 
-/// All sequences where they are few; else as many of each kind as there is room for. Kinds are read from names.
-pub fn chosen(names: &[&str]) -> Chosen {
+/// All sequences where they are no more than `most`, which is at least 2; else as many of each kind as there is room for. Kinds are read
+/// from names.
+pub fn chosen(names: &[&str], most: usize) -> Chosen {
     let count = names.len();
-    if count <= MOST {
+    if count <= most {
         let words = if count == 1 { "The only sequence.".into() } else { format!("All {count} sequences.") };
         return Chosen { sequences: (0..count).collect(), words };
     }
     let kinds = kinds(names);
-    if kinds.len() < 2 || kinds.len() > MOST {
+    if kinds.len() < 2 || kinds.len() > most {
         // Evenly over all of them, the first and the last among them.
-        let sequences = (0..MOST).map(|k| k * (count - 1) / (MOST - 1)).collect();
-        return Chosen { sequences, words: format!("{MOST} of {count} sequences, evenly over all of them.") };
+        let sequences = (0..most).map(|k| k * (count - 1) / (most - 1)).collect();
+        return Chosen { sequences, words: format!("{most} of {count} sequences, evenly over all of them.") };
     }
-    let each = MOST / kinds.len();
+    let each = most / kinds.len();
     let mut sequences: Vec<usize> = kinds.iter().flat_map(|(_, own)| own.iter().take(each).copied()).collect();
     sequences.sort_unstable();
     let list: Vec<String> =
@@ -73,15 +74,15 @@ mod tests {
     fn every_kind_is_drawn_and_named() {
         let names: Vec<String> = (0..40).map(|k| format!("{}_{k}", ["arc", "line", "loop"][k % 3])).collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        let found = chosen(&names);
+        let found = chosen(&names, MANY);
         assert_eq!(found.sequences, (0..12).collect::<Vec<_>>());
         assert_eq!(
             found.words,
             "12 of 40 sequences, some of each kind: arc (4 of 14), line (4 of 13), loop (4 of 13)."
         );
-        assert_eq!(chosen(&names[..2]).words, "All 2 sequences.");
+        assert_eq!(chosen(&names[..2], MANY).words, "All 2 sequences.");
         let numbers: Vec<String> = (0..100).map(|k| k.to_string()).collect();
-        let found = chosen(&numbers.iter().map(String::as_str).collect::<Vec<_>>());
+        let found = chosen(&numbers.iter().map(String::as_str).collect::<Vec<_>>(), MANY);
         assert_eq!((found.sequences.len(), found.sequences[0], found.sequences[11]), (12, 0, 99));
     }
 

@@ -16,11 +16,13 @@ use scrnn_run::history::Row;
 use scrnn_run::source::Source;
 use scrnn_run::trained::Trained;
 
-use crate::chosen::{Chosen, chosen, kinds, planes};
+use crate::chosen::{Chosen, MANY, chosen, kinds, planes};
 use crate::{calibration_blocks, held_out, learning_curves, playground};
 
 /// Samples of each sequence that are drawn at most, and of all figures of one kind together.
 const SAMPLES: (usize, usize) = (600, 40_000);
+/// Panels over time of all channels together, where each has four or more.
+const PANELS: usize = 36;
 /// Channels that are drawn.
 const CHANNELS: usize = 24;
 
@@ -175,7 +177,9 @@ fn channel_sheet(scores: &[ChannelScore], ahead: &str) -> Block {
 struct Canvas<'a> {
     trained: &'a Trained,
     data: &'a Dataset,
-    chosen: Chosen,
+    /// Sequences that are drawn in planes, and over time: the latter are a figure for each channel.
+    many: Chosen,
+    few: Chosen,
     /// Samples of each sequence.
     samples: usize,
     /// Seconds between samples, where that is known.
@@ -186,12 +190,12 @@ impl<'a> Canvas<'a> {
     fn new(trained: &'a Trained, source: &'a Source) -> Self {
         let data = &source.data;
         let names: Vec<&str> = data.sequences().iter().map(|sequence| sequence.name.as_str()).collect();
-        let chosen = chosen(&names);
-        let lines = chosen.sequences.len() * data.channels().len().min(CHANNELS);
+        let few = chosen(&names, (PANELS / data.channels().len().max(1)).clamp(4, MANY));
+        let lines = few.sequences.len() * data.channels().len().min(CHANNELS);
         // Panels side by side have room for fewer.
-        let most = if chosen.sequences.len() > 3 { SAMPLES.0 / 3 } else { SAMPLES.0 };
+        let most = if few.sequences.len() > 3 { SAMPLES.0 / 3 } else { SAMPLES.0 };
         let samples = (SAMPLES.1 / lines.max(1)).clamp(60, most);
-        Self { trained, data, chosen, samples, period: source.period }
+        Self { trained, data, many: chosen(&names, MANY), few, samples, period: source.period }
     }
 
     fn delay(&self) -> usize {
@@ -204,18 +208,22 @@ impl<'a> Canvas<'a> {
     }
 
     /// Which sequences are drawn, and how much of them.
-    fn words(&self) -> String {
+    fn words(&self, chosen: &Chosen) -> String {
         let longest = self.data.sequences().iter().map(Sequence::len).max().unwrap_or(0);
         let cut = if longest > self.samples {
             format!(" The first {} samples of each.", self.samples)
         } else {
             String::new()
         };
-        format!("{}{cut}", self.chosen.words)
+        format!("{}{cut}", chosen.words)
     }
 
-    fn chosen<'b>(&'b self, generated: &'b [Generated]) -> impl Iterator<Item = (&'b Sequence, &'b Generated)> {
-        self.chosen.sequences.iter().filter_map(|&s| Some((self.data.sequences().get(s)?, generated.get(s)?)))
+    fn these<'b>(
+        &'b self,
+        chosen: &'b Chosen,
+        generated: &'b [Generated],
+    ) -> impl Iterator<Item = (&'b Sequence, &'b Generated)> {
+        chosen.sequences.iter().filter_map(|&s| Some((self.data.sequences().get(s)?, generated.get(s)?)))
     }
 
     /// In how many sequences some channel goes half of its range beyond it, and of how many.
@@ -257,7 +265,7 @@ impl<'a> Canvas<'a> {
                     ],
                 )
             };
-            let panels: Vec<(String, Vec<Series>)> = self.chosen(closed).map(panel).collect();
+            let panels: Vec<(String, Vec<Series>)> = self.these(&self.many, closed).map(panel).collect();
             // All panels have the same axes, those of what was recorded with some room.
             let recorded: Vec<Series> = panels.iter().map(|(_, series)| series[1].clone()).collect();
             let whole = Panel::spanning("", recorded);
@@ -288,7 +296,7 @@ impl<'a> Canvas<'a> {
                 caption: format!(
                     "The network fed with its own predictions and their noise, from the initial state that it learned for each \
                      sequence. It need not follow the recording, but should look like it. {}",
-                    self.words()
+                    self.words(&self.many)
                 ),
                 thesis: String::new(),
                 drawing: Chart { columns, aspect, x_label, y_label, panels }.into(),
@@ -338,7 +346,7 @@ impl<'a> Canvas<'a> {
             }
             Panel::spanning(sequence.name.clone(), series)
         };
-        let panels: Vec<Panel> = self.chosen(generated).map(panel).collect();
+        let panels: Vec<Panel> = self.these(&self.few, generated).map(panel).collect();
         let channel = &self.data.channels()[i];
         let (columns, aspect) = if panels.len() > 3 { (2, 2.0) } else { (1, 3.6) };
         let x_label = if self.period.is_some() { "seconds" } else { "sample" };
@@ -347,7 +355,7 @@ impl<'a> Canvas<'a> {
             let caption = format!(
                 "Recorded samples, and what the network predicted for each from those {ahead_of} it, with a band of two predicted \
                  standard deviations: 95 of 100 samples should lie within. {}",
-                self.words(),
+                self.words(&self.few),
                 ahead_of = if delay == 1 { "before".to_owned() } else { format!("{delay} steps and more before") },
             );
             (format!("ahead-{}", i + 1), format!("{channel}, {ahead}"), caption)
@@ -355,7 +363,7 @@ impl<'a> Canvas<'a> {
             let caption = format!(
                 "The network fed with its own predictions and their noise, from the initial state that it learned for each \
                  sequence. It need not follow the recording, but should look like it. {}",
-                self.words()
+                self.words(&self.few)
             );
             (format!("on-its-own-{}", i + 1), format!("{channel}, on its own beside the recording"), caption)
         };

@@ -36,7 +36,9 @@ pub fn sections(jobs: &[JobResult<Findings>], materials: &[Material]) -> Vec<Sec
 /// How to see the robot move.
 fn to_see_it() -> Block {
     let command = "scrnn simulate reach seed-1 --best --view reach.html";
-    Block::Text(format!("To see the robot at work, in 3-D, type this in the folder of this page and open reach.html: {command}"))
+    Block::Text(format!(
+        "To see the robot at work, in 3-D, type this in the folder of this page and open reach.html: {command}"
+    ))
 }
 
 /// The performances at the three positions.
