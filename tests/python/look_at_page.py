@@ -91,4 +91,5 @@ def main():
     print(f"{count} figures, nothing asked for, nothing on the console")
 
 
-main()
+if __name__ == "__main__":
+    main()

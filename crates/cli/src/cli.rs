@@ -8,7 +8,7 @@ use scrnn::engine::InstructionSet;
 use crate::args::Shared;
 use crate::command::{
     compare, completions, convert, data, evaluate, export, generate, inspect, recognize, report, reproduce, simulate,
-    sweep, train,
+    sweep, train, view,
 };
 
 static VERSION: LazyLock<String> =
@@ -30,6 +30,7 @@ And on data of your own:
   scrnn recognize runs/mine new.csv                     which learned sequence is this?
   scrnn evaluate runs/mine new.csv                      how well does it do on what it did not learn?
   scrnn report runs/mine                                the run as a page
+  scrnn view between.mcap                               a recording as a page that plays it
 
 Results go to stdout, progress and messages to stderr. Sequences count from 1, as in the thesis.
 
@@ -70,6 +71,7 @@ pub enum Command {
     Simulate(simulate::Arguments),
     Reproduce(reproduce::Arguments),
     Report(report::Arguments),
+    View(view::Arguments),
     Inspect(inspect::Arguments),
     Convert(convert::Arguments),
     Export(export::Arguments),

@@ -41,6 +41,7 @@ fn run() -> u8 {
         Command::Simulate(arguments) => command::simulate::run(&arguments, &shared),
         Command::Reproduce(arguments) => command::reproduce::run(&arguments, (&shared, &signals)),
         Command::Report(arguments) => command::report::run(&arguments, &shared),
+        Command::View(arguments) => command::view::run(&arguments),
         Command::Inspect(arguments) => command::inspect::run(&arguments, &shared),
         Command::Convert(arguments) => command::convert::run(&arguments, &shared),
         Command::Export(arguments) => command::export::run(&arguments, &shared),

@@ -44,6 +44,32 @@ impl Bars {
     }
 }
 
+/// Something that takes a while and knows no epochs: on a terminal, what it is and for how long, until this is dropped.
+#[derive(Debug)]
+pub struct Busy(Option<ProgressBar>);
+
+impl Busy {
+    /// From now on; `what` is the beginning of a sentence, e.g. "making the data".
+    pub fn with(what: &str, quiet: bool) -> Self {
+        if quiet || !std::io::stderr().is_terminal() {
+            return Self(None);
+        }
+        let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed}")
+            .unwrap_or_else(|_| ProgressStyle::default_spinner());
+        let bar = ProgressBar::new_spinner().with_style(style).with_message(what.to_owned());
+        bar.enable_steady_tick(BETWEEN_UPDATES);
+        Self(Some(bar))
+    }
+}
+
+impl Drop for Busy {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.0 {
+            bar.finish_and_clear();
+        }
+    }
+}
+
 /// Shows the epochs as they pass.
 #[derive(Debug)]
 struct Progress {

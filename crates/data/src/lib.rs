@@ -66,7 +66,7 @@ pub use joining::read_all;
 pub use natural::natural;
 pub use problem::FormatProblem;
 pub use reading::{Facts, Gap, Reading, Topic};
-pub use recording::RecordingProblem;
+pub use recording::{RecordingProblem, Told, play};
 pub use remark::{Level, Remark};
 pub use replace::{HALF_WRITTEN, is_one_file, replace, sweep};
 pub use selection::{Axes, Missing, Selection, TimeSource};

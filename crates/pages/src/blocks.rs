@@ -49,7 +49,7 @@ pub fn learning_curves(file: &str, title: &str, runs: &[(String, &[Row])], floor
         "Mean squared error per step and channel, as a power of ten: lower is better."
     };
     let caption = format!("{caption}{}", recoveries_in_words(runs));
-    let y_label = if with_variance { "nll" } else { "log10 of the squared error" };
+    let y_label = if with_variance { "nll, nats" } else { "log10 of the squared error" };
     let chart =
         Chart { columns: 1, aspect: 2.2, x_label: "epoch".into(), y_label: y_label.into(), panels: vec![panel] };
     let (file, title, thesis) = (file.to_owned(), title.to_owned(), String::new());
@@ -86,6 +86,11 @@ pub fn calibration_blocks(assessment: &Assessment) -> Vec<Block> {
         rows.push(vec!["the truth: entropy of the noise".into(), shown(assessment.entropy_of_noise)]);
     }
     rows.extend(assessment.baselines.iter().map(|baseline| vec![baseline.model.to_owned(), shown(baseline.nll)]));
+    // Whatever is new to the network says more than what it learned.
+    let judged = match assessment.nll_held_out {
+        Some(_) => "the sequences that were held out",
+        None => "the sequences that it learned",
+    };
     let mut blocks = vec![Block::Sheet(Sheet {
         caption: "nll in nats per step and channel".into(),
         head: vec!["model".into(), "nll".into()],
@@ -96,7 +101,7 @@ pub fn calibration_blocks(assessment: &Assessment) -> Vec<Block> {
     let Some(calibration) = &assessment.calibration else { return blocks };
     let percent = |share: f64| format!("{:.1} %", 100.0 * share);
     blocks.push(Block::Sheet(Sheet {
-        caption: "Are errors as large as predicted?".into(),
+        caption: format!("Are errors as large as predicted? On {judged}"),
         head: ["", "here", "Gaussian"].map(String::from).to_vec(),
         rows: vec![
             vec![
@@ -115,19 +120,20 @@ pub fn calibration_blocks(assessment: &Assessment) -> Vec<Block> {
         Series::line("as large as predicted", Tone::Truth, vec![(0.0, 0.0), (largest, largest)]),
         Series::dots("observed", Tone::Ours, points),
     ];
-    let panel = Panel { title: String::new(), x: (0.0, largest), y: (0.0, largest), series, failed: false };
+    let panel =
+        Panel { title: String::new(), x: (0.0, largest), y: (0.0, largest), series, failed: false, equal: false };
     let chart = Chart {
         columns: 1,
         aspect: 1.7,
-        x_label: "predicted standard deviation".into(),
+        x_label: "predicted standard deviation, scaled units".into(),
         y_label: "observed".into(),
         panels: vec![panel],
     };
     blocks.push(Block::Figure(Box::new(Figure {
         file: "calibration".into(),
-        title: "Predicted against observed standard deviation".into(),
+        title: format!("Predicted against observed standard deviation, on {judged}"),
         caption: "Steps are put into groups of similar predicted variance; each dot is a group, with the root mean \
-                  square of its errors. On the line, predictions are right."
+                  square of its errors. On the line, predictions are right; above it, errors are larger than predicted."
             .into(),
         thesis: String::new(),
         drawing: chart.into(),

@@ -5,8 +5,8 @@
 
 use std::fmt::Write as _;
 
-use plotters::coord::Shift;
-use plotters::prelude::*;
+use super::axis::Axis;
+use super::paper::{Anchor, Form, OPACITY, Paper, text_width};
 
 /// What a colour stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,21 +28,21 @@ pub enum Tone {
 }
 
 /// Name of the theme's variable, and the colour in the light theme. No two are the same.
-const TONES: [(&str, RGBColor); 10] = [
-    ("ink", RGBColor(0x22, 0x26, 0x2B)),
-    ("grid", RGBColor(0xDD, 0xE0, 0xE4)),
-    ("ours", RGBColor(0x00, 0x62, 0xB1)),
-    ("truth", RGBColor(0xC4, 0x45, 0x00)),
-    ("data", RGBColor(0x6B, 0x72, 0x7B)),
-    ("failed", RGBColor(0xC8, 0x00, 0x2E)),
-    ("level-0", RGBColor(0x00, 0x5A, 0xA7)),
-    ("level-1", RGBColor(0x00, 0x8A, 0x63)),
-    ("level-2", RGBColor(0xB0, 0x72, 0x00)),
-    ("level-3", RGBColor(0xA8, 0x2C, 0x7C)),
+const TONES: [(&str, [u8; 3]); 10] = [
+    ("ink", [0x22, 0x26, 0x2B]),
+    ("grid", [0xDD, 0xE0, 0xE4]),
+    ("ours", [0x00, 0x62, 0xB1]),
+    ("truth", [0xC4, 0x45, 0x00]),
+    ("data", [0x6B, 0x72, 0x7B]),
+    ("failed", [0xC8, 0x00, 0x2E]),
+    ("level-0", [0x00, 0x5A, 0xA7]),
+    ("level-1", [0x00, 0x8A, 0x63]),
+    ("level-2", [0xB0, 0x72, 0x00]),
+    ("level-3", [0xA8, 0x2C, 0x7C]),
 ];
 
 impl Tone {
-    fn entry(self) -> (&'static str, RGBColor) {
+    fn entry(self) -> (&'static str, [u8; 3]) {
         let index = match self {
             Self::Ink => 0,
             Self::Grid => 1,
@@ -55,17 +55,18 @@ impl Tone {
         TONES[index]
     }
 
-    fn colour(self) -> RGBColor {
+    /// The colour in the light theme.
+    pub(super) fn rgb(self) -> [u8; 3] {
         self.entry().1
     }
 
     /// The colour in the light theme, as SVG writes it.
     pub(super) fn hex(self) -> String {
-        hex(self.colour())
+        hex(self.rgb())
     }
 }
 
-fn hex(RGBColor(r, g, b): RGBColor) -> String {
+fn hex([r, g, b]: [u8; 3]) -> String {
     format!("#{r:02X}{g:02X}{b:02X}")
 }
 
@@ -104,7 +105,11 @@ pub enum Mark {
     Line,
     /// A dot at each.
     Dots,
-    /// A text at each.
+    /// A dot at each, with a text beside it where there is room, and in any case where the pointer rests on it.
+    Named(Vec<String>),
+    /// All between a line through them, from below, and one through these values, from above.
+    Band(Vec<f64>),
+    /// A text at each, and nothing else.
     Texts(Vec<String>),
     /// A square around each, one unit wide and high, filled as strongly as said (0 to 1), with a text in it. Axes then have no numbers.
     Cells(Vec<(f64, String)>),
@@ -133,6 +138,20 @@ impl Series {
     pub fn dots(name: impl Into<String>, tone: Tone, points: Vec<(f64, f64)>) -> Self {
         Self { name: name.into(), tone, mark: Mark::Dots, points }
     }
+
+    /// A band of what lies between two values at each place: x, from, to.
+    pub fn band(name: impl Into<String>, tone: Tone, places: impl IntoIterator<Item = (f64, f64, f64)>) -> Self {
+        let (points, tops) = places.into_iter().map(|(x, low, high)| ((x, low), high)).unzip();
+        Self { name: name.into(), tone, mark: Mark::Band(tops), points }
+    }
+
+    /// The upper ends of a band.
+    fn tops(&self) -> Vec<(f64, f64)> {
+        match &self.mark {
+            Mark::Band(tops) => self.points.iter().zip(tops).map(|(&(x, _), &top)| (x, top)).collect(),
+            _ => Vec::new(),
+        }
+    }
 }
 
 /// One pair of axes.
@@ -148,25 +167,17 @@ pub struct Panel {
     pub series: Vec<Series>,
     /// Whether a large cross says that this failed.
     pub failed: bool,
-}
-
-/// Numbers farther from 0 than this are drawn here: ticks have to be found between them.
-const FARTHEST: f64 = 1e100;
-
-/// A range that an axis can have: its ends are finite, and far enough apart that numbers lie between them.
-fn sound((low, high): (f64, f64)) -> (f64, f64) {
-    let near = |end: f64| if end.is_nan() { 0.0 } else { end.clamp(-FARTHEST, FARTHEST) };
-    let (low, high) = (near(low), near(high));
-    let least = (1e-9 * low.abs().max(high.abs())).max(1.0 / FARTHEST);
-    let middle = f64::midpoint(low, high);
-    if high - low >= least { (low, high) } else { (middle - least, middle + least) }
+    /// Whether a step across is drawn as long as a step up, as for places in a plane.
+    pub equal: bool,
 }
 
 impl Panel {
     /// A panel whose axes span all that is drawn.
     pub fn spanning(title: impl Into<String>, series: Vec<Series>) -> Self {
         let range = |of: &dyn Fn(&(f64, f64)) -> f64| {
-            let values = series.iter().flat_map(|series| &series.points).map(of).filter(|value| value.is_finite());
+            let tops = series.iter().flat_map(Series::tops);
+            let points = series.iter().flat_map(|series| &series.points).copied();
+            let values = points.chain(tops).map(|point| of(&point)).filter(|value| value.is_finite());
             let (low, high) =
                 values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
             match high - low {
@@ -176,7 +187,7 @@ impl Panel {
             }
         };
         let (x, y) = (range(&|point| point.0), range(&|point| point.1));
-        Self { title: title.into(), x, y, series, failed: false }
+        Self { title: title.into(), x, y, series, failed: false, equal: false }
     }
 
     /// The same with its vertical axis from 0.
@@ -203,36 +214,67 @@ pub struct Chart {
 
 /// A name in the legend, and where it stands.
 struct Entry<'a> {
-    name: &'a str,
-    tone: Tone,
-    line: bool,
-    x: i32,
-    y: i32,
+    series: &'a Series,
+    x: f64,
+    y: f64,
 }
 
-/// Width of all charts in the SVG's own units: two for each of the page's.
+/// Width of all charts of a page in the SVG's own units: two for each of the page's.
 pub(super) const WIDTH: u32 = 1360;
 /// Height of text: readable where a phone shows the chart at a quarter of its size.
-pub(super) const TEXT: f64 = 38.0;
-const LEGEND_ROW: i32 = 58;
-const FONT: &str = "sans-serif";
+pub(super) const TEXT: f64 = 34.0;
+/// Height of text in print, in millimetres: 7.5 points.
+const TEXT_IN_PRINT: f64 = 2.65;
+const LEGEND_ROW: f64 = 52.0;
+/// Points of a panel that can have labels.
+const LABELLED: usize = 300;
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Drawn = Result<(), Box<dyn std::error::Error>>;
+/// What all panels of a chart have in common.
+struct Layout {
+    /// Of tick labels and titles.
+    size: f64,
+    top: f64,
+    /// Left of the first column, and of others.
+    left: (f64, f64),
+    right: f64,
+    /// Below the last row, and below others.
+    bottom: (f64, f64),
+    plot: (f64, f64),
+    legend: f64,
+    /// Whether all panels have the same numbers across, and up.
+    shared: (bool, bool),
+    ticks: (usize, usize),
+}
 
 impl Chart {
     /// All points: panel, series, x, y.
     pub(super) fn csv(&self) -> String {
         let mut text = "panel,series,x,y\n".to_owned();
         for panel in &self.panels {
-            for series in &panel.series {
-                for (k, (x, y)) in series.points.iter().enumerate() {
-                    let name = match &series.mark {
-                        Mark::Texts(texts) => csv_field(&format!("{} {}", series.name, texts[k])),
-                        Mark::Cells(cells) => csv_field(&format!("{} {}", series.name, cells[k].1)),
-                        _ => csv_field(&series.name),
-                    };
-                    writeln!(text, "{},{name},{x:?},{y:?}", csv_field(&panel.title)).expect("a string takes all");
+            let mut rows = |name: &str, points: &mut dyn Iterator<Item = (f64, f64)>| {
+                for (x, y) in points {
+                    let (panel, name) = (csv_field(&panel.title), csv_field(name));
+                    writeln!(text, "{panel},{name},{x:?},{y:?}").expect("a string takes all");
+                }
+            };
+            for Series { name, mark, points, .. } in &panel.series {
+                match mark {
+                    Mark::Named(texts) | Mark::Texts(texts) => {
+                        for (&point, text) in points.iter().zip(texts) {
+                            rows(&format!("{name} {text}"), &mut std::iter::once(point));
+                        }
+                    }
+                    Mark::Cells(cells) => {
+                        for (&point, (_, text)) in points.iter().zip(cells) {
+                            rows(&format!("{name} {text}"), &mut std::iter::once(point));
+                        }
+                    }
+                    Mark::Band(tops) => {
+                        rows(&format!("{name}, from"), &mut points.iter().copied());
+                        let tops = points.iter().zip(tops).map(|(&(x, _), &top)| (x, top));
+                        rows(&format!("{name}, to"), &mut tops.into_iter());
+                    }
+                    Mark::Line | Mark::Dots => rows(name, &mut points.iter().copied()),
                 }
             }
         }
@@ -241,181 +283,296 @@ impl Chart {
 
     /// The chart as an SVG element in light colours, with `title` for those who cannot see it.
     pub(super) fn svg(&self, title: &str) -> String {
-        let rows = self.panels.len().div_ceil(self.columns);
-        let width = f64::from(WIDTH) / self.columns as f64;
-        let furniture = match self.columns {
-            0..=2 => 132.0,
-            3..=6 => 64.0,
-            _ => 0.0,
-        };
-        let legend = match self.legend().last() {
-            Some(entry) => entry.y + LEGEND_ROW,
-            None => 8,
-        } as u32;
-        let height = legend + ((width / self.aspect + furniture) * rows as f64) as u32;
-        let mut svg = String::new();
-        {
-            let root = SVGBackend::with_string(&mut svg, (WIDTH, height)).into_drawing_area();
-            // Drawing into a string fails for no reason that a reader could do anything about.
-            self.draw(&root, legend).expect("a string takes all");
-            root.present().expect("a string takes all");
-        }
-        let svg = super::escape::printable(&svg);
-        let body = svg.split_once(">\n").map_or("", |(_, body)| body);
-        let dashed = format!("stroke=\"{}\"", Tone::Truth.hex());
-        let body = body.replace(&dashed, &format!("{dashed} stroke-dasharray=\"14 9\""));
-        let title = super::escape::escaped(title);
-        format!(
-            "<svg viewBox=\"0 0 {WIDTH} {height}\" xmlns=\"http://www.w3.org/2000/svg\" role=\"img\">\n<title>{title}</title>\n{body}"
-        )
+        self.paper(f64::from(WIDTH)).svg(title, "")
     }
 
-    /// Names and tones of the series, each name once, in rows. A single one needs no legend.
-    fn legend(&self) -> Vec<Entry<'_>> {
+    /// As an SVG file so many millimetres wide, its text in the size of print.
+    pub(super) fn svg_in_print(&self, title: &str, millimetres: f64) -> String {
+        let paper = self.in_print(millimetres);
+        let height = millimetres * paper.height / paper.width;
+        on_white(&paper.svg(title, &format!(" width=\"{millimetres}mm\" height=\"{height:.2}mm\"")))
+    }
+
+    /// As a PDF file so many millimetres wide, its text in the size of print.
+    pub(super) fn pdf(&self, title: &str, millimetres: f64) -> Vec<u8> {
+        self.in_print(millimetres).pdf(title, millimetres)
+    }
+
+    fn in_print(&self, millimetres: f64) -> Paper {
+        self.paper(millimetres * TEXT / TEXT_IN_PRINT)
+    }
+
+    fn small(&self) -> bool {
+        self.columns > 2
+    }
+
+    fn rows(&self) -> usize {
+        self.panels.len().div_ceil(self.columns.max(1))
+    }
+
+    /// Names and tones of the series, each name once, in rows, and how high they are. A single one needs no legend.
+    fn legend(&self, width: f64) -> (Vec<Entry<'_>>, f64) {
         let mut entries: Vec<Entry<'_>> = Vec::new();
-        let (mut x, mut y) = (16, 0);
+        let (mut x, mut y) = (16.0, 0.0);
         for series in self.panels.iter().flat_map(|panel| &panel.series) {
-            if series.name.is_empty() || entries.iter().any(|entry| entry.name == series.name) {
+            if series.name.is_empty() || entries.iter().any(|entry| entry.series.name == series.name) {
                 continue;
             }
-            let width = 68 + (series.name.chars().count() as f64 * TEXT * 0.47) as i32;
-            if x > 16 && x + width > WIDTH as i32 {
-                (x, y) = (16, y + LEGEND_ROW);
+            let own = 68.0 + text_width(&series.name, TEXT);
+            if x > 16.0 && x + own > width {
+                (x, y) = (16.0, y + LEGEND_ROW);
             }
-            entries.push(Entry { name: &series.name, tone: series.tone, line: series.mark == Mark::Line, x, y });
-            x += width + 40;
+            entries.push(Entry { series, x, y });
+            x += own + 36.0;
         }
-        if entries.len() > 1 { entries } else { Vec::new() }
+        if entries.len() > 1 { (entries, y + LEGEND_ROW) } else { (Vec::new(), 8.0) }
     }
 
-    fn draw(&self, root: &Area<'_>, legend_height: u32) -> Drawn {
-        let (legend, body) = root.split_vertically(legend_height);
-        let text = (FONT, TEXT).into_font().color(&Tone::Ink.colour());
-        for Entry { name, tone, line, x, y } in self.legend() {
-            let middle = y + 28;
-            if line {
-                legend.draw(&PathElement::new([(x, middle), (x + 56, middle)], tone.colour().stroke_width(5)))?;
-            } else {
-                legend.draw(&Circle::new((x + 40, middle), 9, tone.colour().filled()))?;
-            }
-            legend.draw(&Text::new(name.to_owned(), (x + 68, middle - 16), text.clone()))?;
-        }
-        let rows = self.panels.len().div_ceil(self.columns);
-        let areas = body.split_evenly((rows, self.columns));
-        for (index, (panel, area)) in self.panels.iter().zip(&areas).enumerate() {
-            self.draw_panel(panel, area, index % self.columns == 0, index + self.columns >= self.panels.len())?;
-        }
-        Ok(())
-    }
-
-    fn draw_panel(&self, panel: &Panel, area: &Area<'_>, first: bool, last: bool) -> Drawn {
-        let (x, y) = (sound(panel.x), sound(panel.y));
-        let (small, tiny) = (self.columns > 2, self.columns > 6);
-        let ink = Tone::Ink.colour();
-        let size = if small { 0.86 * TEXT } else { TEXT };
-        let (left, bottom) = match small {
-            true if tiny => (0, 0),
-            true => (if self.y_label.is_empty() { 12 } else { 100 }, 12),
-            false => (128, if last { 104 } else { 56 }),
+    fn layout(&self, width: f64) -> Layout {
+        let size = TEXT
+            * match self.columns {
+                0..=2 => 1.0,
+                3..=6 => 0.8,
+                _ => 0.62,
+            };
+        let same = |of: &dyn Fn(&Panel) -> (f64, f64)| {
+            let mut ranges = self.panels.iter().map(|panel| Axis::of(of(panel)));
+            let first = ranges.next();
+            self.small() && ranges.all(|range| Some(range) == first)
         };
-        let mut builder = ChartBuilder::on(area);
-        builder.margin(if tiny { 3 } else { 6 });
-        if !small {
-            builder.margin_right(54);
+        let shared = (same(&|panel| panel.x), same(&|panel| panel.y));
+        // What tick labels need does not depend on where exactly the ticks are.
+        let rough = if self.small() { (3, 3) } else { (8, 5) };
+        let widest = |of: &dyn Fn(&Panel) -> (f64, f64), most: usize| {
+            let of = |panel: &Panel| {
+                let axis = Axis::of(of(panel));
+                axis.ticks(most).into_iter().map(|tick| text_width(&axis.shown(tick, most), size)).fold(0.0, f64::max)
+            };
+            self.panels.iter().map(of).fold(0.0, f64::max)
+        };
+        let labels = 14.0 + widest(&|panel| panel.y, rough.1);
+        let y_label = if self.y_label.is_empty() { 0.0 } else { 1.35 * size };
+        let narrow = if self.columns > 6 { 4.0 } else { 10.0 };
+        let left = (labels + y_label, if shared.1 { narrow } else { labels });
+        let right = (0.5 * widest(&|panel| panel.x, rough.0)).max(narrow);
+        let titled = self.panels.iter().any(|panel| !panel.title.is_empty());
+        let top = if titled { 1.5 * size } else { 0.6 * size };
+        let x_label = if self.x_label.is_empty() { 0.0 } else { 1.3 * size };
+        let numbers = 1.5 * size;
+        let bottom = (numbers + x_label + 8.0, if shared.0 { narrow } else { numbers + 8.0 });
+        let columns = self.columns.max(1) as f64;
+        let across = (width - left.0 - (columns - 1.0) * left.1 - columns * right).max(40.0 * columns) / columns;
+        let up = across / self.aspect.max(0.05);
+        let ticks = (((across / (4.2 * size)) as usize).clamp(2, 8), ((up / (2.0 * size)) as usize).clamp(2, 6));
+        Layout { size, top, left, right, bottom, plot: (across, up), legend: self.legend(width).1, shared, ticks }
+    }
+
+    /// The chart on paper so wide.
+    fn paper(&self, width: f64) -> Paper {
+        let layout = self.layout(width);
+        let rows = self.rows();
+        let row = layout.top + layout.plot.1;
+        let below = if rows == 0 { 0.0 } else { layout.bottom.0 + layout.bottom.1 * (rows - 1) as f64 };
+        let mut paper = Paper::new(width, layout.legend + row * rows as f64 + below);
+        for Entry { series, x, y } in self.legend(width).0 {
+            let middle = y + 0.48 * LEGEND_ROW;
+            match series.mark {
+                Mark::Line => paper.draw(series.tone, series.line_form(vec![(x, middle), (x + 56.0, middle)], 5.0)),
+                Mark::Band(_) => {
+                    let (top, bottom) = (middle - 14.0, middle + 14.0);
+                    let outline = vec![(x, top), (x + 56.0, top), (x + 56.0, bottom), (x, bottom)];
+                    paper.draw(series.tone, Form::Area { outline, opacity: OPACITY });
+                }
+                _ => paper.draw(series.tone, Form::Disc { centre: (x + 40.0, middle), radius: 9.0 }),
+            }
+            paper.text(Tone::Ink, (x + 68.0, middle + 0.34 * TEXT), TEXT, Anchor::Start, &series.name);
         }
-        builder.set_label_area_size(LabelAreaPosition::Left, left);
-        builder.set_label_area_size(LabelAreaPosition::Bottom, bottom);
-        if !panel.title.is_empty() && !tiny {
-            builder.caption(&panel.title, (FONT, size).into_font().color(&ink));
+        for (index, panel) in self.panels.iter().enumerate() {
+            let (column, row_index) = (index % self.columns.max(1), index / self.columns.max(1));
+            let left = layout.left.0 + column as f64 * (layout.plot.0 + layout.right + layout.left.1);
+            let top = layout.legend + layout.top + row_index as f64 * (row + layout.bottom.1);
+            self.draw_panel(&mut paper, panel, &layout, (left, top), index);
         }
-        let mut chart = builder.build_cartesian_2d(x.0..x.1, y.0..y.1)?;
-        let (x_span, y_span) = (x.1 - x.0, y.1 - y.0);
-        let format_x = move |value: &f64| shown(*value, x_span);
-        let format_y = move |value: &f64| shown(*value, y_span);
-        let mut mesh = chart.configure_mesh();
-        mesh.axis_style(Tone::Data.colour())
-            .light_line_style(TRANSPARENT)
-            .bold_line_style(Tone::Grid.colour())
-            .label_style((FONT, size * 0.92).into_font().color(&ink))
-            .x_labels(if small { 0 } else { 8 })
-            .y_labels(if small { 3 } else { 5 })
-            .x_label_formatter(&format_x)
-            .y_label_formatter(&format_y);
-        if panel.series.iter().any(|series| matches!(series.mark, Mark::Cells(_))) {
-            mesh.x_labels(0).y_labels(0).disable_mesh();
+        paper
+    }
+
+    fn draw_panel(&self, paper: &mut Paper, panel: &Panel, layout: &Layout, (left, top): (f64, f64), index: usize) {
+        let Layout { size, plot: (across, up), .. } = *layout;
+        let (first, last) = (index.is_multiple_of(self.columns.max(1)), index + self.columns >= self.panels.len());
+        let (mut x, mut y) = (Axis::of(panel.x), Axis::of(panel.y));
+        if panel.equal {
+            let (per_x, per_y) = (across / x.span(), up / y.span());
+            if per_x > per_y { x = x.longer(per_x / per_y) } else { y = y.longer(per_y / per_x) }
         }
-        if small && self.y_label.is_empty() {
-            mesh.y_labels(0);
+        let bottom = top + up;
+        let at = |(a, b): (f64, f64)| (left + across * x.share(a), bottom - up * y.share(b));
+        if !panel.title.is_empty() {
+            let room = across + layout.right;
+            let shown = fitting(&panel.title, room, size);
+            paper.text(Tone::Ink, (left, top - 0.4 * size), shown.1, Anchor::Start, &shown.0);
+            if let Some(mark) = paper.marks.last_mut() {
+                mark.title.clone_from(&panel.title);
+            }
         }
-        if last && !small {
-            mesh.x_desc(&self.x_label).axis_desc_style((FONT, TEXT).into_font().color(&ink));
+        if panel.series.is_empty() && !panel.failed {
+            return;
         }
-        if first && !small {
-            mesh.y_desc(&self.y_label).axis_desc_style((FONT, TEXT).into_font().color(&ink));
+        let in_cells = panel.series.iter().any(|series| matches!(series.mark, Mark::Cells(_)));
+        let ticks = if in_cells { (0, 0) } else { layout.ticks };
+        let of = |axis: &Axis, count: usize| if count == 0 { Vec::new() } else { axis.ticks(count) };
+        for tick in of(&x, ticks.0) {
+            let (place, _) = at((tick, y.low));
+            paper.line(Tone::Grid, 1.5, &[(place, top), (place, bottom)]);
+            if last || !layout.shared.0 {
+                let below = (place, bottom + 1.15 * size);
+                paper.text(Tone::Ink, below, 0.92 * size, Anchor::Middle, &x.shown(tick, layout.ticks.0));
+            }
         }
-        mesh.draw()?;
-        let inside = |at: (f64, f64)| (at.0.clamp(x.0, x.1), at.1.clamp(y.0, y.1));
+        for tick in of(&y, ticks.1) {
+            let (_, place) = at((x.low, tick));
+            paper.line(Tone::Grid, 1.5, &[(left, place), (left + across, place)]);
+            if first || !layout.shared.1 {
+                let beside = (left - 10.0, place + 0.33 * size);
+                paper.text(Tone::Ink, beside, 0.92 * size, Anchor::End, &y.shown(tick, layout.ticks.1));
+            }
+        }
+        if !in_cells {
+            paper.line(Tone::Data, 1.5, &[(left, top), (left, bottom), (left + across, bottom)]);
+        }
+        if last && !self.x_label.is_empty() {
+            let below = (left + 0.5 * across, bottom + 2.45 * size);
+            paper.text(Tone::Ink, below, size, Anchor::Middle, &self.x_label);
+        }
+        if first && !self.y_label.is_empty() {
+            let (text, size) = fitting(&self.y_label, up + layout.top, size);
+            let beside = (0.9 * size, top + 0.5 * up);
+            paper.draw(Tone::Ink, Form::Text { at: beside, size, anchor: Anchor::Middle, upwards: true, text });
+        }
         for series in &panel.series {
-            let points = || series.points.iter().filter(|(x, y)| x.is_finite() && y.is_finite()).map(|&at| inside(at));
-            let colour = series.tone.colour();
+            let points = series.points.iter().filter(|(x, y)| x.is_finite() && y.is_finite()).map(|&point| at(point));
             match &series.mark {
                 Mark::Line => {
-                    let width = if small { 2 } else { 3 };
-                    chart.draw_series(LineSeries::new(points(), colour.stroke_width(width)))?;
+                    let width = if self.small() { 2.0 } else { 3.0 };
+                    paper.draw(series.tone, series.line_form(points.collect(), width));
                 }
                 Mark::Dots => {
-                    chart
-                        .draw_series(points().map(|at| Circle::new(at, if small { 3 } else { 5 }, colour.filled())))?;
+                    let radius = if self.small() { 3.0 } else { 5.0 };
+                    points.for_each(|centre| paper.draw(series.tone, Form::Disc { centre, radius }));
+                }
+                Mark::Band(tops) => {
+                    let whole = series.points.iter().zip(tops);
+                    let whole = whole.filter(|((x, y), top)| x.is_finite() && y.is_finite() && top.is_finite());
+                    let (low, high): (Vec<_>, Vec<_>) = whole.map(|(&(x, y), &top)| (at((x, y)), at((x, top)))).unzip();
+                    let outline: Vec<(f64, f64)> = low.into_iter().chain(high.into_iter().rev()).collect();
+                    paper.draw(series.tone, Form::Area { outline, opacity: OPACITY });
                 }
                 Mark::Cells(cells) => {
-                    let style = (FONT, TEXT).into_font().color(&ink).pos(centred());
-                    for (&(x, y), (strength, text)) in series.points.iter().zip(cells) {
-                        let corners = [inside((x - 0.5, y - 0.5)), inside((x + 0.5, y + 0.5))];
+                    for (&(a, b), (strength, text)) in series.points.iter().zip(cells) {
+                        let corner = |(dx, dy): (f64, f64)| at((a + dx, b + dy));
+                        let outline = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)].map(corner).to_vec();
                         // Text has to stay readable on it, in both themes.
-                        let fill = colour.mix(0.05 + 0.5 * strength.clamp(0.0, 1.0));
-                        chart.draw_series([Rectangle::new(corners, fill.filled())])?;
-                        chart.draw_series([Text::new(text.clone(), inside((x, y)), style.clone())])?;
+                        let opacity = 0.05 + 0.5 * strength.clamp(0.0, 1.0);
+                        paper.draw(series.tone, Form::Area { outline, opacity });
+                        let (x, y) = at((a, b));
+                        paper.text(Tone::Ink, (x, y + 0.33 * size), 0.92 * size, Anchor::Middle, text);
                     }
                 }
                 Mark::Texts(texts) => {
-                    let style = (FONT, TEXT).into_font().color(&colour);
-                    let style = style.pos(centred());
-                    chart.draw_series(
-                        points().zip(texts).map(|(at, text)| Text::new(text.clone(), at, style.clone())),
-                    )?;
+                    for ((x, y), text) in points.zip(texts) {
+                        paper.text(series.tone, (x, y + 0.33 * size), 0.92 * size, Anchor::Middle, text);
+                    }
+                }
+                Mark::Named(_) => {}
+            }
+        }
+        self.draw_named(paper, panel, (size, &at), (left, top, left + across, bottom));
+        if panel.failed {
+            for (from, to) in [(top, bottom), (bottom, top)] {
+                paper.line(Tone::Failed, 4.0, &[(left, from), (left + across, to)]);
+            }
+        }
+    }
+
+    /// Dots with names. A name is written where it covers neither another name nor a dot.
+    fn draw_named(
+        &self,
+        paper: &mut Paper,
+        panel: &Panel,
+        (size, at): (f64, &dyn Fn((f64, f64)) -> (f64, f64)),
+        (left, top, right, bottom): (f64, f64, f64, f64),
+    ) {
+        let radius = if self.small() { 5.0 } else { 8.0 };
+        let mut named = Vec::new();
+        for series in &panel.series {
+            let Mark::Named(names) = &series.mark else { continue };
+            for (&point, name) in series.points.iter().zip(names) {
+                if point.0.is_finite() && point.1.is_finite() {
+                    let centre = at(point);
+                    paper.draw(series.tone, Form::Disc { centre, radius });
+                    if let Some(mark) = paper.marks.last_mut() {
+                        mark.title.clone_from(name);
+                    }
+                    named.push((centre, name, series.tone));
                 }
             }
         }
-        if panel.failed {
-            let ((left, right), (low, high)) = (x, y);
-            for (from, to) in [(low, high), (high, low)] {
-                let cross = [(left, from), (right, to)];
-                chart.draw_series([PathElement::new(cross, Tone::Failed.colour().stroke_width(4))])?;
+        if named.len() > LABELLED {
+            return;
+        }
+        // Corners of what is covered: left, top, right, bottom.
+        let around = |((x, y), ..): &((f64, f64), &String, Tone)| (x - radius, y - radius, x + radius, y + radius);
+        let mut covered: Vec<(f64, f64, f64, f64)> = named.iter().map(around).collect();
+        let size = 0.8 * size;
+        for ((x, y), name, tone) in named {
+            let (width, height, gap) = (text_width(name, size), 0.8 * size, radius + 4.0);
+            let corners = [
+                (x + gap, y - 0.5 * height),
+                (x - gap - width, y - 0.5 * height),
+                (x - 0.5 * width, y - gap - height),
+                (x - 0.5 * width, y + gap),
+                (x + 0.7 * gap, y - 0.7 * gap - height),
+                (x - 0.7 * gap - width, y + 0.7 * gap),
+            ];
+            let free = |&(a, b): &(f64, f64)| {
+                let own = (a, b, a + width, b + height);
+                let inside = own.0 >= left && own.1 >= top && own.2 <= right && own.3 <= bottom;
+                let apart = |other: &(f64, f64, f64, f64)| {
+                    own.2 < other.0 || other.2 < own.0 || own.3 < other.1 || other.3 < own.1
+                };
+                inside && covered.iter().all(apart)
+            };
+            if let Some((a, b)) = corners.into_iter().find(free) {
+                covered.push((a, b, a + width, b + height));
+                paper.text(tone, (a, b + 0.92 * height), size, Anchor::Start, name);
             }
         }
-        Ok(())
     }
 }
 
-/// In the middle of its place.
-fn centred() -> plotters::style::text_anchor::Pos {
-    use plotters::style::text_anchor::{HPos, Pos, VPos};
-    Pos::new(HPos::Center, VPos::Center)
+impl Series {
+    fn line_form(&self, points: Vec<(f64, f64)>, width: f64) -> Form {
+        // Truth is dashed, and so is what has the same colour as another.
+        let dashed = match self.tone {
+            Tone::Truth => true,
+            Tone::Level(level) => level % 8 >= 4,
+            _ => false,
+        };
+        Form::Line { points, width, dashed }
+    }
 }
 
-/// A number on an axis of this length, with as many digits as its neighbours need to differ.
-fn shown(value: f64, span: f64) -> String {
-    if span < 0.003 && value != 0.0 {
-        return format!("{value:.0e}");
+/// A text that fits into so much room, and its size: smaller where it has to be, and cut if that does not help.
+fn fitting(text: &str, room: f64, size: f64) -> (String, f64) {
+    let wide = text_width(text, size);
+    if wide <= room {
+        return (text.to_owned(), size);
     }
-    let digits = match span {
-        20.0.. => 0,
-        2.0.. => 1,
-        _ => (1.0 - span.log10()).ceil().clamp(1.0, 6.0) as usize,
-    };
-    let text = format!("{value:.digits$}");
-    // No "-0.0".
-    if text.trim_start_matches('-').chars().all(|c| matches!(c, '0' | '.')) { "0".to_owned() } else { text }
+    let size = size * (room / wide).max(0.78);
+    let letters = (room / text_width("x", size)) as usize;
+    match text.chars().count() > letters {
+        true => (text.chars().take(letters.saturating_sub(2)).chain("..".chars()).collect(), size),
+        false => (text.to_owned(), size),
+    }
 }
 
 #[cfg(test)]
@@ -477,23 +634,6 @@ mod tests {
     }
 
     #[test]
-    fn cells_are_filled_in_colours_of_the_theme_and_hold_their_texts() {
-        let cells = vec![(0.0, "one".to_owned()), (2.0, "two & more".to_owned())];
-        let series = Series {
-            name: "nll".into(),
-            tone: Tone::Ours,
-            mark: Mark::Cells(cells),
-            points: vec![(1.0, 1.0), (2.0, 1.0)],
-        };
-        let panel = Panel { title: String::new(), x: (0.5, 2.5), y: (0.5, 1.5), series: vec![series], failed: false };
-        let chart = Chart { columns: 1, aspect: 2.0, x_label: "a".into(), y_label: "b".into(), panels: vec![panel] };
-        let svg = themed(chart.svg("Cells"));
-        assert!(svg.matches("<rect").count() >= 2 && svg.contains("opacity=\"0.55\""), "{svg}");
-        assert!(svg.contains("two &amp; more") && !svg.contains("\"#"), "{svg}");
-        assert!(chart.csv().contains("nll one,1.0,1.0\n"), "{}", chart.csv());
-    }
-
-    #[test]
     fn a_file_is_light_on_white_and_names_no_variable() {
         let svg = on_white(&chart().svg("x"));
         assert!(svg.contains("fill=\"#FFFFFF\"") && !svg.contains("var("));
@@ -515,14 +655,171 @@ mod tests {
             chart.panels[0] = Panel::spanning("ends", vec![Series::line("y", Tone::Ours, points)]);
             let svg = chart.svg("ends");
             assert!(svg.trim_end().ends_with("</svg>") && !svg.contains("NaN"), "{low} {high}");
-            let (low, high) = sound((low, high));
+            let Axis { low, high } = Axis::of((low, high));
             assert!(low < high && (high - low).is_finite() && f64::midpoint(low, high) > low);
         }
     }
 
     #[test]
-    fn numbers_on_axes_are_short() {
-        let all = [shown(5e-4, 0.001), shown(0.25, 0.9), shown(-0.0, 2.0), shown(500.0, 1e3), shown(0.01, 0.02)];
-        assert_eq!(all, ["5e-4", "0.25", "0", "500", "0.010"]);
+    fn names_stand_beside_their_dots_and_never_over_each_other() {
+        let names: Vec<String> = (0..40).map(|k| format!("sequence {k}")).collect();
+        let crowd = (0..40).map(|k| (f64::from(k % 7), f64::from(k / 7) + 0.01 * f64::from(k))).collect();
+        let series = Series { name: "s".into(), tone: Tone::Ours, mark: Mark::Named(names), points: crowd };
+        let panels = vec![Panel::spanning("", vec![series])];
+        let chart = Chart { columns: 1, aspect: 1.6, x_label: String::new(), y_label: String::new(), panels };
+        let paper = chart.paper(f64::from(WIDTH));
+        // Every dot says its name where the pointer rests.
+        assert_eq!(paper.marks.iter().filter(|mark| mark.title.starts_with("sequence")).count(), 40);
+        let boxes: Vec<(f64, f64, f64, f64)> = paper
+            .marks
+            .iter()
+            .filter_map(|mark| match &mark.form {
+                Form::Text { at: (x, y), size, text, .. } if text.starts_with("sequence") => {
+                    Some((*x, y - 0.7 * size, x + text_width(text, *size), *y))
+                }
+                _ => None,
+            })
+            .collect();
+        assert!(boxes.len() > 20, "{} names have room", boxes.len());
+        for (k, a) in boxes.iter().enumerate() {
+            assert!(a.0 >= 0.0 && a.2 <= f64::from(WIDTH));
+            for b in &boxes[k + 1..] {
+                assert!(a.2 <= b.0 || b.2 <= a.0 || a.3 <= b.1 || b.3 <= a.1, "{a:?} {b:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_plane_is_drawn_without_distortion_and_a_band_is_filled() {
+        let square = vec![(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
+        let line = Series::line("", Tone::Ours, square);
+        let panels = vec![Panel { equal: true, ..Panel::spanning("", vec![line]) }];
+        let chart = Chart { columns: 1, aspect: 2.0, x_label: String::new(), y_label: String::new(), panels };
+        let paper = chart.paper(f64::from(WIDTH));
+        let corners = paper.marks.iter().find_map(|mark| match &mark.form {
+            Form::Line { points, width, .. } if points.len() == 4 && *width == 3.0 => Some(points.clone()),
+            _ => None,
+        });
+        let corners = corners.expect("the square");
+        let (across, up) = (corners[1].0 - corners[0].0, corners[1].1 - corners[2].1);
+        assert!((across - up).abs() < 1e-9 && across > 100.0, "{corners:?}");
+
+        let band = Series::band("two sd", Tone::Ours, [(0.0, -1.0, 1.0), (1.0, -2.0, 2.0)]);
+        let panel = Panel::spanning("", vec![band]);
+        assert!(panel.y.0 < -2.0 && panel.y.1 > 2.0);
+        let chart = Chart { panels: vec![panel], ..chart };
+        assert!(
+            chart.svg("").contains("<polygon")
+                && chart.csv().contains("\",\"two sd, to\",1.0,2.0".trim_start_matches("\","))
+        );
+    }
+
+    #[test]
+    fn titles_of_small_panels_do_not_reach_into_their_neighbours() {
+        let series = || vec![Series::line("", Tone::Ours, vec![(0.0, 0.0), (1.0, 1.0)])];
+        let title = "shoulder, output, between 1 and 2, and more words than there is room for";
+        let panels = vec![Panel::spanning(title, series()); 10];
+        let chart = Chart { columns: 5, aspect: 1.0, x_label: "a".into(), y_label: "b".into(), panels };
+        let paper = chart.paper(f64::from(WIDTH));
+        let titles = paper.marks.iter().filter(|mark| mark.title == title);
+        for mark in titles.clone() {
+            let Form::Text { size, text, .. } = &mark.form else { panic!("a title is text") };
+            assert!(text_width(text, *size) < 272.0, "{text}");
+        }
+        assert_eq!(titles.count(), 10);
+        let ticks = paper
+            .marks
+            .iter()
+            .filter(|mark| matches!(&mark.form, Form::Text { text, .. } if text == "0" || text.starts_with('1')));
+        assert!(ticks.count() >= 8, "rows and columns have ticks");
+    }
+
+    #[test]
+    fn figures_in_print_have_text_of_one_size() {
+        for (millimetres, units) in [(85.0, 1090.6), (170.0, 2181.1)] {
+            let svg = chart().svg_in_print("x", millimetres);
+            assert!(svg.contains(&format!(" width=\"{millimetres}mm\"")), "{svg}");
+            assert!(svg.contains(&format!("viewBox=\"0 0 {units:.0} ")), "{svg}");
+            assert!(chart().pdf("x", millimetres).starts_with(b"%PDF"));
+        }
+    }
+
+    /// Lightness and two axes of colour (CIE Lab) of a colour as somebody sees it whose cones are those of `cones`.
+    fn seen(hex: &str, cones: &[[f64; 3]; 3]) -> [f64; 3] {
+        let part = |k: usize| f64::from(u8::from_str_radix(&hex[k..k + 2], 16).unwrap()) / 255.0;
+        let linear =
+            [0, 2, 4].map(part).map(|c| if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) });
+        let times = |m: &[[f64; 3]; 3], v: [f64; 3]| m.map(|row| (0..3).map(|k| row[k] * v[k]).sum::<f64>());
+        let rgb = times(cones, linear).map(|c| c.clamp(0.0, 1.0));
+        let xyz = times(&[[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]], rgb);
+        let white = [0.950_47, 1.0, 1.088_83];
+        let f: Vec<f64> = (0..3).map(|k| (xyz[k] / white[k]).max(0.0089)).map(f64::cbrt).collect();
+        [116.0 * f[1] - 16.0, 500.0 * (f[0] - f[1]), 200.0 * (f[1] - f[2])]
+    }
+
+    #[test]
+    fn colours_are_told_apart_by_the_colour_blind_in_light_and_in_dark() {
+        // Machado, Oliveira and Fernandes 2009, severity 1: without red, green or blue cones.
+        let blind = [
+            [
+                [0.152_286, 1.052_583, -0.204_868],
+                [0.114_503, 0.786_281, 0.099_216],
+                [-0.003_882, -0.048_116, 1.051_998],
+            ],
+            [[0.367_322, 0.860_646, -0.227_968], [0.280_085, 0.672_501, 0.047_413], [-0.011_820, 0.042_940, 0.968_881]],
+            [
+                [1.255_528, -0.076_749, -0.178_779],
+                [-0.078_411, 0.930_809, 0.147_602],
+                [0.004_733, 0.691_367, 0.303_900],
+            ],
+        ];
+        let style = include_str!("page.css");
+        for theme in style.split(":root{").skip(1).take(2) {
+            let colour = |name: &str| {
+                let after = theme.split(&format!("--{name}:#")).nth(1).unwrap_or_else(|| panic!("{name}"));
+                after[..6].to_owned()
+            };
+            for group in [["level-0", "level-1", "level-2", "level-3"], ["ours", "truth", "data", "failed"]] {
+                for (k, a) in group.iter().enumerate() {
+                    for b in &group[k + 1..] {
+                        for cones in &blind {
+                            let (p, q) = (seen(&colour(a), cones), seen(&colour(b), cones));
+                            let apart = (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt();
+                            assert!(apart > 14.0, "{a} and {b} in {theme:.40}: {apart:.1}");
+                        }
+                    }
+                }
+            }
+        }
+        // Files have the colours of the light theme.
+        let light = style.split(":root{").nth(1).unwrap();
+        for (name, rgb) in TONES {
+            assert!(light.contains(&format!("--{name}:{}", hex(rgb).to_lowercase())), "{name}");
+        }
+    }
+
+    #[test]
+    fn cells_are_filled_in_colours_of_the_theme_and_hold_their_texts() {
+        let cells = vec![(0.0, "one".to_owned()), (2.0, "two & more".to_owned())];
+        let series = Series {
+            name: "nll".into(),
+            tone: Tone::Ours,
+            mark: Mark::Cells(cells),
+            points: vec![(1.0, 1.0), (2.0, 1.0)],
+        };
+        let panel = Panel {
+            title: String::new(),
+            x: (0.5, 2.5),
+            y: (0.5, 1.5),
+            series: vec![series],
+            failed: false,
+            equal: false,
+        };
+        let chart = Chart { columns: 1, aspect: 2.0, x_label: "a".into(), y_label: "b".into(), panels: vec![panel] };
+        let svg = themed(chart.svg("Cells"));
+        assert!(svg.matches("<polygon").count() == 2 && svg.contains("opacity=\"0.55\""), "{svg}");
+        assert!(svg.contains("two &amp; more") && !svg.contains("\"#"), "{svg}");
+        assert!(chart.csv().contains("nll one,1.0,1.0\n"), "{}", chart.csv());
+        assert!(String::from_utf8(chart.pdf("Cells", 85.0)).unwrap().contains("(two & more) Tj"));
     }
 }

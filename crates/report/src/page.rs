@@ -48,6 +48,29 @@ pub enum Block {
     Figure(Box<Figure>),
     /// Links to files beside the page: texts with their paths.
     Links(Vec<(String, String)>),
+    /// What it all comes to, in a line that stands out.
+    Verdict(String),
+    /// Something to play with.
+    Applet(Box<Applet>),
+}
+
+/// A part of a page that a script brings to life. Its data stand in the page, and nothing is asked for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Applet {
+    /// Unique in the page. The data are the text of the element `NAME-data`.
+    pub name: String,
+    /// What it is, in a few words.
+    pub title: String,
+    /// What to do with it and what to see.
+    pub caption: String,
+    /// Its elements, as HTML that is taken as it is.
+    pub body: String,
+    /// Its own style.
+    pub style: &'static str,
+    /// What brings it to life.
+    pub script: &'static str,
+    /// What the script reads, as JSON.
+    pub data: String,
 }
 
 /// A table. Columns of numbers stand to the right; the words "met" and "missed" are coloured.
@@ -130,16 +153,28 @@ impl Page {
         })
     }
 
+    /// The page as HTML that may ask the server it came from, and nobody else, for more.
+    #[must_use]
+    pub fn live_html(&self) -> String {
+        self.html().replacen("img-src data:\">", "img-src data:; connect-src 'self'\">", 1)
+    }
+
     /// The page as HTML.
     pub fn html(&self) -> String {
         let mut out = String::new();
         let (title, lede) = (escaped(&self.title), escaped(&self.lede));
+        let blocks = || self.sections.iter().flat_map(|section| &section.blocks);
+        let scripts =
+            if blocks().any(|block| matches!(block, Block::Applet(_))) { "'unsafe-inline'" } else { "'none'" };
         write!(
             out,
             "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+             <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; \
+             script-src {scripts}; img-src data:\">\n\
              <meta name=\"color-scheme\" content=\"light dark\">\n<link rel=\"icon\" href=\"data:,\">\n\
-             <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>\n<p class=\"lede\">{lede}</p>\n<nav>"
+             <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<header>\n<h1>{title}</h1>\n\
+             <p class=\"lede\">{lede}</p>\n</header>\n<nav aria-label=\"Sections\">"
         )
         .expect("a string takes all");
         for (k, section) in self.sections.iter().enumerate() {
@@ -147,7 +182,7 @@ impl Page {
         }
         out += "</nav>\n<main>\n";
         for (k, section) in self.sections.iter().enumerate() {
-            out += &format!("<section>\n<h2 id=\"s{k}\">{}</h2>\n", escaped(&section.title));
+            out += &format!("<section aria-labelledby=\"s{k}\">\n<h2 id=\"s{k}\">{}</h2>\n", escaped(&section.title));
             section.blocks.iter().for_each(|block| block.html(&mut out));
             out += "</section>\n";
         }
@@ -169,6 +204,8 @@ impl Block {
                 };
                 *out += &format!("<p class=\"links\">\n{}</p>\n", links.iter().map(link).collect::<String>());
             }
+            Self::Verdict(text) => *out += &format!("<p class=\"verdict\">{}</p>\n", escaped(text)),
+            Self::Applet(applet) => applet.html(out),
         }
     }
 }
@@ -187,12 +224,29 @@ fn address(path: &str) -> String {
     out
 }
 
+impl Applet {
+    fn html(&self, out: &mut String) {
+        let Self { title, caption, body, style, script, data, .. } = self;
+        let (name, title, caption) = (escaped(&self.name), escaped(title), escaped(caption));
+        // In a script's element only its own end tag ends it; in JSON these letters stand in texts alone.
+        let data = data.replace('<', "\\u003c").replace('\u{2028}', "\\u2028").replace('\u{2029}', "\\u2029");
+        *out += &format!(
+            "<div id=\"{name}\" class=\"applet\" role=\"group\" aria-label=\"{title}\">\n<style>\n{style}</style>\n{body}\n\
+             <p class=\"words\"><b>{title}</b>{caption}</p>\n<script type=\"application/json\" id=\"{name}-data\">{data}</script>\n\
+             <script>\n{script}</script>\n</div>\n"
+        );
+    }
+}
+
 impl Sheet {
     fn html(&self, out: &mut String) {
         let short = if self.rows.len() <= 14 { " short" } else { "" };
         // A column of numbers stands to the right.
         let numbers = |column: usize| self.rows.iter().all(|row| row.get(column).is_some_and(|cell| is_number(cell)));
-        *out += &format!("<div class=\"sheet{short}\"><table>\n<caption>{}</caption>\n", escaped(&self.caption));
+        *out += &format!(
+            "<div class=\"sheet{short}\" role=\"region\" aria-label=\"{0}\" tabindex=\"0\"><table>\n<caption>{0}</caption>\n",
+            escaped(&self.caption)
+        );
         if !self.head.is_empty() {
             *out += "<thead><tr>";
             for (column, cell) in self.head.iter().enumerate() {
@@ -233,6 +287,35 @@ impl Figure {
         on_white(&self.drawing.svg(&self.title))
     }
 
+    /// As an SVG file so many millimetres wide, with text in the size of print.
+    #[must_use]
+    pub fn svg_in_print(&self, millimetres: f64) -> String {
+        match &self.drawing {
+            Drawing::Chart(chart) => chart.svg_in_print(&self.title, millimetres),
+            #[cfg(feature = "scenes")]
+            Drawing::Pictures(_) => self.file_svg().replacen("<svg ", &format!("<svg width=\"{millimetres}mm\" "), 1),
+        }
+    }
+
+    /// As a PDF file so many millimetres wide, with text in the size of print; none of pictures of scenes.
+    #[must_use]
+    pub fn pdf(&self, millimetres: f64) -> Option<Vec<u8>> {
+        match &self.drawing {
+            Drawing::Chart(chart) => Some(chart.pdf(&self.title, millimetres)),
+            #[cfg(feature = "scenes")]
+            Drawing::Pictures(_) => None,
+        }
+    }
+
+    /// Whether there is so much side by side that a phone had better show a part of it.
+    fn is_wide(&self) -> bool {
+        match &self.drawing {
+            Drawing::Chart(chart) => chart.columns > 2,
+            #[cfg(feature = "scenes")]
+            Drawing::Pictures(pictures) => pictures.columns > 2,
+        }
+    }
+
     /// The numbers that it is drawn from.
     pub fn csv(&self) -> String {
         match &self.drawing {
@@ -245,7 +328,8 @@ impl Figure {
     fn html(&self, out: &mut String) {
         let Self { file, title, caption, thesis, .. } = self;
         let name = escaped(file);
-        *out += &format!("<figure id=\"{name}\">\n<div class=\"plot\">\n{}</div>\n", self.inline_svg());
+        let many = if self.is_wide() { " many" } else { "" };
+        *out += &format!("<figure id=\"{name}\">\n<div class=\"plot{many}\">\n{}</div>\n", self.inline_svg());
         *out += &format!("<figcaption><b>{}</b>{}", escaped(title), escaped(caption));
         if !thesis.is_empty() {
             *out += &format!("<span class=\"thesis\">Thesis: {}</span>", escaped(thesis));
@@ -304,10 +388,30 @@ mod tests {
         ] {
             assert!(html.contains(part), "{part} is missing in\n{html}");
         }
+        assert!(html.contains("script-src 'none'"));
         let beyond = html.replace("http://www.w3.org/2000/svg", "");
-        for part in ["http", "<script", "@import", "url(", "src="] {
+        for part in ["://", "<script", "@import", "url(", "src="] {
             assert!(!beyond.contains(part), "{part}");
         }
         assert_eq!(page.figures().count(), 1);
+    }
+
+    #[test]
+    fn what_an_applet_reads_cannot_end_its_element() {
+        let applet = Applet {
+            name: "play".into(),
+            title: "A & b".into(),
+            caption: "Drag.".into(),
+            body: "<canvas></canvas>".into(),
+            style: "",
+            script: "1;\n",
+            data: "{\"name\":\"</script><img src=x>\"}".into(),
+        };
+        let blocks = vec![Block::Verdict("It is > 0".into()), Block::Applet(Box::new(applet))];
+        let sections = vec![Section { title: "S".into(), blocks }];
+        let html = Page { title: "P".into(), lede: "L".into(), sections }.html();
+        assert!(html.contains("script-src 'unsafe-inline'") && html.contains("default-src 'none'"));
+        assert!(html.contains("<p class=\"verdict\">It is &gt; 0</p>") && !html.contains("<img"), "{html}");
+        assert!(html.contains("{\"name\":\"\\u003c/script>") && html.matches("</script>").count() == 2, "{html}");
     }
 }

@@ -13,6 +13,7 @@ use scrnn_tasks::{Task, TaskName, interact, make};
 use crate::args::{self, Shared};
 use crate::output;
 use crate::outputs::check_distinct;
+use crate::progress::Busy;
 use scrnn_data::{self as files, Field};
 use scrnn_run::failure::{Ending, Failure, Result};
 use scrnn_run::memory::{self, product};
@@ -69,6 +70,8 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     }
     let truth = arguments.truth.clone().or_else(|| arguments.out.as_deref().map(beside));
     check_distinct(&[("--out", arguments.out.as_deref()), ("--truth", truth.as_deref())], &[])?;
+    // What goes to a terminal stands there alone.
+    let _busy = arguments.out.is_some().then(|| Busy::with("making the data", shared.quiet));
     match (arguments.task, film) {
         (TaskName::Reach, _) => return reach(arguments, size, shared),
         (TaskName::Interact, Some(path)) => {

@@ -17,6 +17,7 @@ use serde::Serialize;
 
 use crate::args::{Part, Shared, count};
 use crate::output;
+use crate::progress::Busy;
 
 /// Judge a trained network by sequences that it did not learn
 ///
@@ -101,6 +102,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     let Some(trained) = all.first() else { return Ok(Ending::Done) };
     all.iter().for_each(|one| shared.say_of(one));
     let engine = shared.engine()?;
+    let busy = Busy::with("evaluating", shared.quiet);
     let source = trained.source(engine.threads());
     let data = sequences((arguments, shared), trained, source.as_ref().ok())?;
     let bench = bench(arguments, trained, (&data, source.as_ref().ok()), &engine)?;
@@ -125,6 +127,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     let learned = (&checkpoint.scaling, checkpoint.sequences.as_slice());
     let mut report = Report::new(&bench, &mixture, learned, (search, arguments.samples))?;
     report.simple_models_fitted_to_learned = source.is_ok();
+    drop(busy);
     if arguments.json {
         output::print_json(&Printed { report, calibrated })?;
         return Ok(Ending::Done);

@@ -15,3 +15,4 @@ pub mod schema;
 pub mod simulate;
 pub mod sweep;
 pub mod train;
+pub mod view;

@@ -1,5 +1,6 @@
 //! `scrnn train`: from an experiment to a run folder.
 
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -8,8 +9,9 @@ use scrnn::learning::Outcome;
 
 use crate::args::{MOST_IN_TOML, Part, Shared, whole};
 use crate::output;
-use crate::progress::Bars;
+use crate::progress::{Bars, Busy};
 use crate::signals::Signals;
+use scrnn_pages::live::Live;
 use scrnn_run::experiment::{Experiment, Override};
 use scrnn_run::failure::{Ending, Failure, Result};
 use scrnn_run::interrupt::Interrupt;
@@ -63,6 +65,9 @@ pub struct Arguments {
     /// Replace a value of the experiment, e.g. training.adam.rate=0.001 or network.groups.context.units=20
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<Override>,
+    /// Serve a page on this machine that shows the training as it goes on, at this port or any that is free
+    #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "0", require_equals = true)]
+    watch: Option<u16>,
     /// Print the result as a JSON object
     #[arg(long)]
     json: bool,
@@ -106,6 +111,9 @@ pub fn run(arguments: &Arguments, (shared, signals): (&Shared, &Signals)) -> Res
         Found::Refuse
     };
     if mixture {
+        if arguments.watch.is_some() {
+            return Err(Failure::input("--watch shows one training, and this is a mixture", "train without --watch"));
+        }
         return train_mixture(&experiment, (&path, found), (shared, &engine, &interrupt), arguments.json);
     }
     if !members::folders(&path).is_empty() {
@@ -114,17 +122,65 @@ pub fn run(arguments: &Arguments, (shared, signals): (&Shared, &Signals)) -> Res
     }
     let source = match source {
         Some(source) => source,
-        None => source::load(&experiment.data, engine.threads())?,
+        None => {
+            let _busy = Busy::with("making the data", shared.quiet);
+            source::load(&experiment.data, engine.threads())?
+        }
     };
-    let progress = Bars::new(shared.quiet).bar("", experiment.training.epochs);
+    let mut progress = Bars::new(shared.quiet).bar("", experiment.training.epochs);
+    let live = arguments
+        .watch
+        .map(|port| Live::start(port, (&experiment.name, experiment.training.epochs), path.clone(), &source.data));
+    let live = live.transpose()?;
+    if let Some(live) = &live {
+        output::say(format_args!("watch it at {}", live.url()));
+        progress = live.watching(progress);
+    }
     let training = train_on(&experiment, source, (&path, found), (&engine, &interrupt), progress, shared)?;
-    let verdict = Verdict::new(&training, &engine)?;
+    let verdict = {
+        let _busy = Busy::with("judging the network", shared.quiet);
+        Verdict::new(&training, &engine)?
+    };
     if arguments.json {
         output::print_json(&verdict)?;
+    } else if std::io::stdout().is_terminal() {
+        // For a person: whole words in a line, and what to type next. Who reads a file or a pipe gets the sentences as they are.
+        output::print(&format!("{}\nTo see it:\n  scrnn report {}\n", wrapped(&verdict.to_string()), path.display()))?;
     } else {
         output::print(&verdict.to_string())?;
     }
     Ok(ending(&training, &path, shared))
+}
+
+/// Long lines of a text in pieces of whole words.
+fn wrapped(text: &str) -> String {
+    const WIDTH: usize = 80;
+    let mut out = String::new();
+    for line in text.lines() {
+        if line.starts_with(' ') || line.chars().count() <= WIDTH {
+            out += line;
+        } else {
+            let mut column = 0;
+            for word in line.split(' ') {
+                let length = word.chars().count();
+                match column {
+                    0 => {}
+                    _ if column + 1 + length > WIDTH => {
+                        out.push('\n');
+                        column = 0;
+                    }
+                    _ => {
+                        out.push(' ');
+                        column += 1;
+                    }
+                }
+                out += word;
+                column += length;
+            }
+        }
+        out.push('\n');
+    }
+    out
 }
 
 /// Trains the members of a mixture side by side.
@@ -170,5 +226,19 @@ fn ending(training: &Training, path: &Path, shared: &Shared) -> Ending {
             ));
             Ending::Diverged
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sentences_wrap_at_words_and_tables_stay() {
+        let text = format!("{}\n  a table {}\nshort\n", "word and ".repeat(20).trim_end(), "x".repeat(100));
+        let found = wrapped(&text);
+        assert!(found.lines().filter(|line| !line.starts_with(' ')).all(|line| line.len() <= 80), "{found}");
+        assert_eq!(found.split_whitespace().collect::<Vec<_>>(), text.split_whitespace().collect::<Vec<_>>());
+        assert!(found.contains(&format!("\n  a table {}\nshort\n", "x".repeat(100))));
     }
 }

@@ -7,7 +7,7 @@ use crate::budget::OverBudget;
 use crate::{FileError, RecordingProblem};
 
 /// Where messages of one kind go.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
 pub struct Channel {
     /// Its topic.
     pub topic: String,
@@ -18,7 +18,7 @@ pub struct Channel {
 }
 
 /// A type of messages.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
 pub struct Schema {
     /// Its name; empty if nothing tells it.
     pub name: String,

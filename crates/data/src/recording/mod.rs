@@ -10,6 +10,7 @@
 //! | messages of the same names, side by side | [`collecting`] |
 //! | when they were made | [`clocks`] |
 //! | rows at even times | [`joining`] |
+//! | all messages as they are, to be shown | [`playing`] |
 //!
 //! A recording is a sequence; one that `scrnn` wrote may hold several, told apart by its topic `/sequence`.
 
@@ -22,6 +23,7 @@ mod joining;
 mod message;
 mod naming;
 mod numbers;
+mod playing;
 mod problem;
 mod protobuf;
 mod ros;
@@ -44,6 +46,7 @@ use crate::source::Source;
 use crate::{FileError, Selection, TimeSource, Topic};
 
 pub use files::is_bag;
+pub use playing::{Told, play};
 pub use problem::RecordingProblem;
 
 /// Reads a file or a folder.

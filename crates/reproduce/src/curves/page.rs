@@ -54,7 +54,7 @@ fn phase_plots<'a>(
         .map(|(s, values)| {
             let points = values.chunks_exact(n).take(steps).map(|sample| (sample[a], sample[b])).collect();
             let series = vec![Series::line("", tone, points)];
-            Panel { title: title(s), x: (-1.1, 1.1), y: (-1.1, 1.1), series, failed: failed(s) }
+            Panel { title: title(s), x: (-1.1, 1.1), y: (-1.1, 1.1), series, failed: failed(s), equal: true }
         })
         .collect();
     let columns = if panels.len() > 12 { 12 } else { 4 };
@@ -264,7 +264,7 @@ fn initial_states(jobs: &[JobResult<Findings>], materials: &[Material], twelve: 
         let series = (0..4).map(|level| {
             let own: Vec<usize> = (0..points.len()).filter(|&s| material.levels[s] == level).collect();
             let mark = match twelve {
-                true => Mark::Texts(own.iter().map(|s| (s + 1).to_string()).collect()),
+                true => Mark::Named(own.iter().map(|s| (s + 1).to_string()).collect()),
                 false => Mark::Dots,
             };
             let points = own.into_iter().map(|s| points[s]).collect();

@@ -316,7 +316,7 @@ pub fn window(materials: &[&Material]) -> Option<Figure> {
                 .map(|at| Series::line("", Tone::Grid, vec![(at as f64 - 0.5, y.0), (at as f64 - 0.5, y.1)]))
                 .to_vec();
             all.extend(series);
-            Panel { title, x: (from as f64, to as f64), y, series: all, failed: false }
+            Panel { title, x: (from as f64, to as f64), y, series: all, failed: false, equal: false }
         };
         let mean = |pair: &Held<'_>, column: usize| pair.0[column];
         let context = |pair: &Held<'_>, column: usize| pair.1[column];

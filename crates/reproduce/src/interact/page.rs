@@ -15,6 +15,11 @@ pub fn sections(results: &Results<Findings>, materials: &[&Material]) -> Vec<Sec
                 Block::Figure(Box::new(figures::initial_states(materials))),
                 Block::Figure(Box::new(figures::on_its_own(materials))),
                 Block::Figure(Box::new(figures::in_world(materials))),
+                Block::Text(
+                    "To see both robots at work, in 3-D, type this in the folder of this page and open interact.html: \
+                     scrnn simulate interact wide-1 --best --ers --view interact.html"
+                        .into(),
+                ),
             ],
         },
         reactions(results),
@@ -35,7 +40,14 @@ fn dots(title: &str, values: &[f64], high: f64) -> Panel {
         Series::line("mean", Tone::Ink, vec![(0.5, mean), (n + 0.5, mean)]),
         Series::dots("a network", Tone::Ours, points),
     ];
-    Panel { title: format!("{title}: {mean:.1}"), x: (0.0, n + 1.0), y: (0.0, high), series, failed: false }
+    Panel {
+        title: format!("{title}: {mean:.1}"),
+        x: (0.0, n + 1.0),
+        y: (0.0, high),
+        series,
+        failed: false,
+        equal: false,
+    }
 }
 
 fn bars(file: &str, title: &str, thesis: &str, panels: Vec<(&str, Vec<f64>)>) -> Block {

@@ -56,7 +56,7 @@ fn phase(material: &Material) -> Block {
     let steps = 800;
     let phase_plane = |title: &str, tone, points: Vec<(f64, f64)>| {
         let series = vec![Series::line("", tone, points)];
-        Panel { title: title.into(), x: (-1.15, 1.15), y: (-1.0, 1.0), series, failed: false }
+        Panel { title: title.into(), x: (-1.15, 1.15), y: (-1.0, 1.0), series, failed: false, equal: false }
     };
     let (data, z) = (&material.data.sequences()[0], &material.z.sequences()[0]);
     let recorded = (0..steps.min(data.len())).map(|k| (data.sample(k)[0], z.sample(k)[0]));

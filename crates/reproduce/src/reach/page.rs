@@ -25,12 +25,20 @@ pub fn sections(jobs: &[JobResult<Findings>], materials: &[Material]) -> Vec<Sec
     vec![
         Section {
             title: "Touching".into(),
-            blocks: vec![over_time(material), snapshots(material), touches(findings), shifts(findings)],
+            blocks: vec![over_time(material), snapshots(material), to_see_it(), touches(findings), shifts(findings)],
         },
         Section { title: "Generalisation".into(), blocks: vec![phase_plots(material)] },
         Section { title: "Variance over the cycle".into(), blocks: super::variance_page::blocks(&findings.variance) },
         Section { title: "Drivers compared".into(), blocks: compared },
     ]
+}
+
+/// How to see the robot move.
+fn to_see_it() -> Block {
+    let command = "scrnn simulate reach seed-1 --best --view reach.html";
+    Block::Text(format!(
+        "To see the robot at work, in 3-D, type this in the folder of this page and open reach.html: {command}"
+    ))
 }
 
 /// The performances at the three positions.
@@ -164,6 +172,7 @@ fn phase_plots(material: &Material) -> Block {
                     y: (0.0, 1.0),
                     series: Vec::new(),
                     failed: false,
+                    equal: false,
                 });
                 continue;
             }

@@ -4,8 +4,8 @@
 //! sample in the data's units, state  ->  mean and variance in the data's units, state
 //! ```
 //!
-//! [`OneStep`] describes it in plain lists of numbers. [`OneStep::c`] and [`OneStep::onnx`] write it down, and have no other
-//! source. The state is all that goes from step to step:
+//! [`OneStep`] describes it in plain lists of numbers. [`OneStep::c`], [`OneStep::onnx`] and [`OneStep::json`] write it down, and have no
+//! other source. The state is all that goes from step to step:
 //!
 //! | part | shape | what it is |
 //! |---|---|---|
@@ -20,12 +20,14 @@
 //! those of the mixture.
 
 use scrnn::parameters::Block;
+use serde::Serialize;
 
 use crate::failure::{Failure, Result};
 use crate::trained::Trained;
 
 mod c;
 mod graph;
+mod json;
 mod onnx;
 
 pub use onnx::Precision;
@@ -53,7 +55,7 @@ pub struct OneStep {
 }
 
 /// What the members of a mixture have in common.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 struct Kind {
     /// xi.
     delay: usize,
@@ -76,7 +78,7 @@ impl Kind {
 }
 
 /// The numbers of one network; weights are row-major and read "to from".
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 struct Member {
     /// u_0.
     internal: Vec<f64>,

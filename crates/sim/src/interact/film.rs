@@ -2,8 +2,10 @@
 
 use std::io::Cursor;
 
+use scrnn::analysis::excursions::Side;
+
 use super::interaction::{CHANNELS, Interaction};
-use super::order::PERIOD;
+use super::order::{PERIOD, branchings};
 use crate::recording::{Heading, Joint, Recorder, RecordingError, Robot};
 use crate::robot::joints::{HEAD, RIGHT_ARM};
 use crate::robot::nao;
@@ -82,6 +84,11 @@ impl Film {
             let depth = interaction.depth();
             recorder.event(time, &format!("collision with {collision:?}").to_lowercase(), &[("depth", depth)])?;
         }
+        let (order, sample) = (interaction.order(), (interaction.time() / PERIOD).round() as usize);
+        if let Some(branch) = branchings(order.len()).iter().position(|at| *at == sample) {
+            let side = if order[branch] == Side::Left { "left" } else { "right" };
+            recorder.event(time, &format!("branching {} to the {side}", branch + 1), &[])?;
+        }
         let in_view = interaction.object_in_view();
         if in_view != self.in_view {
             self.in_view = in_view;
@@ -138,7 +145,8 @@ mod tests {
             assert_eq!(topics[topic], 80, "{topic}");
         }
         assert_eq!(times, [0, 4_000_000_000]);
-        assert!(!topics.contains_key("/events") && !topics.contains_key("/predicted_variance"), "{topics:?}");
+        // The only branching of each.
+        assert!(topics["/events"] == 2 && !topics.contains_key("/predicted_variance"), "{topics:?}");
     }
 
     #[test]

@@ -4,6 +4,7 @@ pub mod camera;
 pub mod gaze;
 pub mod joints;
 pub mod kinematics;
+pub mod looks;
 pub mod nao;
 
 mod description;

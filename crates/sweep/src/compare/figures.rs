@@ -184,6 +184,7 @@ fn heat_map(collected: &Collected, measure: &Measure, summaries: &[(usize, Summa
         y: (-0.3, height + 0.5),
         series: std::iter::once(cells).chain(names).collect(),
         failed: false,
+        equal: false,
     };
     let (across, up) = (&collected.knobs[0], &collected.knobs[1]);
     let chart = Chart {
@@ -260,6 +261,7 @@ pub fn learning(collected: &Collected, order: &[usize]) -> Option<Block> {
         y: (low - room, high + room),
         series,
         failed: false,
+        equal: false,
     };
     let of = |setting: usize, name: &str, tone: Tone| -> Vec<Series> {
         let own = curves.iter().filter(|(other, _, _)| *other == setting);

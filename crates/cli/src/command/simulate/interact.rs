@@ -13,6 +13,7 @@ use serde_json::json;
 
 use crate::args::Shared;
 use crate::command::recognize::RegressionArguments;
+use crate::command::view;
 use crate::output;
 use crate::outputs::check_distinct;
 use scrnn_data::{self as files, Field};
@@ -65,6 +66,9 @@ pub struct Arguments {
     /// Write a recording of the world
     #[arg(long, value_name = "FILE")]
     mcap: Option<PathBuf>,
+    /// Write a page that plays what happened, in any browser
+    #[arg(long, value_name = "PAGE.html")]
+    view: Option<PathBuf>,
     /// Print a JSON object
     #[arg(long)]
     json: bool,
@@ -83,7 +87,11 @@ struct Trial {
 
 /// Simulates.
 pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
-    let outputs = [("--out", arguments.out.as_deref()), ("--mcap", arguments.mcap.as_deref())];
+    let outputs = [
+        ("--out", arguments.out.as_deref()),
+        ("--mcap", arguments.mcap.as_deref()),
+        ("--view", arguments.view.as_deref()),
+    ];
     check_distinct(&outputs, &[("RUN", Some(&arguments.run))])?;
     let trained = Trained::open(&arguments.run, arguments.best)?;
     shared.say_of(&trained);
@@ -94,7 +102,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     }
     let options = arguments.options(&trained)?;
     let network = trained.network();
-    let mut film = match &arguments.mcap {
+    let mut film = match arguments.mcap.as_ref().or(arguments.view.as_ref()) {
         Some(_) => Some(Film::new(&[("run", &arguments.run.display().to_string())])?),
         None => None,
     };
@@ -130,8 +138,14 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         let (order, branches) = (letters(&order), followed.branches.clone());
         trials.push(Trial { order, initial_state, branches, latency: deadline.latency(), followed });
     }
-    if let (Some(film), Some(path)) = (film, &arguments.mcap) {
-        files::replace(path, &film.finish()?)?;
+    if let Some(film) = film {
+        let bytes = film.finish()?;
+        if let Some(path) = &arguments.mcap {
+            files::replace(path, &bytes)?;
+        }
+        if let Some(page) = &arguments.view {
+            view::write(page, &bytes)?;
+        }
     }
     if let Some(path) = &arguments.out {
         write(path, &trained, &trials)?;

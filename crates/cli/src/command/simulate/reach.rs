@@ -14,6 +14,7 @@ use scrnn_sim::world::WorldOptions;
 use serde::Serialize;
 
 use crate::args::Shared;
+use crate::command::view;
 use crate::output;
 use crate::outputs::check_distinct;
 use scrnn_data as files;
@@ -61,6 +62,9 @@ pub struct Arguments {
     /// Write a recording of all that happened
     #[arg(long, value_name = "FILE")]
     mcap: Option<PathBuf>,
+    /// Write a page that plays what happened, in any browser
+    #[arg(long, value_name = "PAGE.html")]
+    view: Option<PathBuf>,
     /// Print a JSON object
     #[arg(long)]
     json: bool,
@@ -112,7 +116,8 @@ struct Outcome<'a> {
 
 /// Simulates.
 pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
-    check_distinct(&[("--mcap", arguments.mcap.as_deref())], &[("RUN", Some(&arguments.run))])?;
+    let outputs = [("--mcap", arguments.mcap.as_deref()), ("--view", arguments.view.as_deref())];
+    check_distinct(&outputs, &[("RUN", Some(&arguments.run))])?;
     let trained = Trained::open(&arguments.run, arguments.best)?;
     shared.say_of(&trained);
     let checkpoint = &trained.checkpoint;
@@ -138,7 +143,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     }
     let performance =
         Performance { y: arguments.position.0, samples, shift, frozen: None, world: WorldOptions::default() };
-    let mut recording = match &arguments.mcap {
+    let mut recording = match arguments.mcap.as_ref().or(arguments.view.as_ref()) {
         Some(_) => Some(recording(&trained, arguments)?),
         None => None,
     };
@@ -149,9 +154,16 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         }
     };
     let performed = perform(&performance, &mut driver, &mut look)?;
-    if let (Some(path), Some(recording)) = (&arguments.mcap, recording) {
-        files::replace(path, &recording.finish()?.into_inner())?;
-        shared.say(format_args!("recording: {}", path.display()));
+    if let Some(recording) = recording {
+        let bytes = recording.finish()?.into_inner();
+        if let Some(path) = &arguments.mcap {
+            files::replace(path, &bytes)?;
+            shared.say(format_args!("recording: {}", path.display()));
+        }
+        if let Some(page) = &arguments.view {
+            view::write(page, &bytes)?;
+            shared.say(format_args!("page that plays it: {}", page.display()));
+        }
     }
     let result = Outcome {
         position: performance.y,
