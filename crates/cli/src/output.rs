@@ -6,7 +6,7 @@
 
 use std::borrow::Cow;
 use std::fmt::Display;
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Condvar, LazyLock, Mutex, MutexGuard, PoisonError};
@@ -28,6 +28,11 @@ pub enum Reader {
 
 /// Between two tries to write to a pipe that takes nothing, and does not want to be waited for.
 const PAUSE: Duration = Duration::from_millis(1);
+
+/// Whether a person reads what goes to stdout, and no file or program.
+pub fn is_for_a_person() -> bool {
+    io::stdout().is_terminal()
+}
 
 /// Writes a text to stdout as it is.
 pub fn offer(text: &str) -> Result<Reader> {

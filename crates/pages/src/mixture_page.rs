@@ -34,7 +34,8 @@ pub fn page(all: &[Trained], rows: &[Vec<Row>], engine: &Engine) -> Result<Page>
         sections.push(Section { title: "Settings of the first member".into(), blocks: vec![Block::Verbatim(text)] });
     }
     let lede = format!(
-        "A mixture of {} networks: its density is the mean of theirs. `scrnn report` of a member's folder draws what that network does.",
+        "A mixture of {} networks: its density is the mean of theirs. `scrnn report` of a member's folder draws what that network \
+         does, and has it in the page to play with.",
         all.len()
     );
     Ok(Page { title: format!("Run: {name}"), lede, sections })

@@ -341,20 +341,21 @@ impl Chart {
             self.small() && ranges.all(|range| Some(range) == first)
         };
         let shared = (same(&|panel| panel.x), same(&|panel| panel.y));
-        // What tick labels need does not depend on where exactly the ticks are.
-        let rough = if self.small() { (3, 3) } else { (8, 5) };
+        // How many ticks there will be depends on the room that their labels leave.
         let widest = |of: &dyn Fn(&Panel) -> (f64, f64), most: usize| {
             let of = |panel: &Panel| {
                 let axis = Axis::of(of(panel));
-                axis.ticks(most).into_iter().map(|tick| text_width(&axis.shown(tick, most), size)).fold(0.0, f64::max)
+                let labels =
+                    (2..=most).flat_map(|most| axis.ticks(most).into_iter().map(move |tick| axis.shown(tick, most)));
+                labels.map(|label| text_width(&label, size)).fold(0.0, f64::max)
             };
             self.panels.iter().map(of).fold(0.0, f64::max)
         };
-        let labels = 14.0 + widest(&|panel| panel.y, rough.1);
+        let labels = 14.0 + widest(&|panel| panel.y, 6);
         let y_label = if self.y_label.is_empty() { 0.0 } else { 1.35 * size };
         let narrow = if self.columns > 6 { 4.0 } else { 10.0 };
         let left = (labels + y_label, if shared.1 { narrow } else { labels });
-        let right = (0.5 * widest(&|panel| panel.x, rough.0)).max(narrow);
+        let right = (0.5 * widest(&|panel| panel.x, 8)).max(narrow);
         let titled = self.panels.iter().any(|panel| !panel.title.is_empty());
         let top = if titled { 1.5 * size } else { 0.6 * size };
         let x_label = if self.x_label.is_empty() { 0.0 } else { 1.3 * size };
@@ -712,6 +713,23 @@ mod tests {
             chart.svg("").contains("<polygon")
                 && chart.csv().contains("\",\"two sd, to\",1.0,2.0".trim_start_matches("\","))
         );
+    }
+
+    #[test]
+    fn labels_of_ticks_stay_on_the_paper() {
+        for columns in [1, 2, 4, 12] {
+            for range in [(-1.1, 1.1), (-1234.0, 88.0), (0.0, 1e-7), (-0.031, 0.02)] {
+                let line = || vec![Series::line("", Tone::Ours, vec![(range.0, range.0), (range.1, range.1)])];
+                let panels = (0..columns).map(|k| Panel::spanning(k.to_string(), line())).collect();
+                let chart = Chart { columns, aspect: 1.0, x_label: "a".into(), y_label: String::new(), panels };
+                let paper = chart.paper(f64::from(WIDTH));
+                for mark in &paper.marks {
+                    if let Form::Text { at, size, anchor: Anchor::End, text, .. } = &mark.form {
+                        assert!(at.0 - text_width(text, *size) >= 0.0, "{columns} {text}");
+                    }
+                }
+            }
+        }
     }
 
     #[test]

@@ -1,6 +1,5 @@
 //! `scrnn train`: from an experiment to a run folder.
 
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -143,7 +142,7 @@ pub fn run(arguments: &Arguments, (shared, signals): (&Shared, &Signals)) -> Res
     };
     if arguments.json {
         output::print_json(&verdict)?;
-    } else if std::io::stdout().is_terminal() {
+    } else if output::is_for_a_person() {
         // For a person: whole words in a line, and what to type next. Who reads a file or a pipe gets the sentences as they are.
         output::print(&format!("{}\nTo see it:\n  scrnn report {}\n", wrapped(&verdict.to_string()), path.display()))?;
     } else {

@@ -48,7 +48,7 @@ pub fn section(trained: &Trained, source: &Source) -> Option<Section> {
     }
 }
 
-/// None where there is no plane of initial states; a sentence where the network is too large for a page.
+/// None for what is no single network; a sentence where it is too large for a page, or its initial states lie in no plane.
 fn applet(trained: &Trained, source: &Source) -> Option<Result<Applet, String>> {
     let (checkpoint, data) = (&trained.checkpoint, &source.data);
     let (units, n, delay) = (checkpoint.topology.context_units(), data.channels().len(), checkpoint.topology.delay());
@@ -65,7 +65,10 @@ fn applet(trained: &Trained, source: &Source) -> Option<Result<Applet, String>> 
     let components = PrincipalComponents::of(states.values(), units);
     let coordinates = match &components {
         Some(components) if units >= 2 && count >= 3 => components.first(2),
-        _ => return None,
+        _ => {
+            let why = "There is nothing to play with here: initial states have no plane, as fewer than three were learned, or all are the same.";
+            return Some(Err(why.into()));
+        }
     };
     let mean: Vec<f64> = (0..units)
         .map(|i| (0..states.sequences()).map(|s| states.sequence(s)[i]).sum::<f64>() / states.sequences() as f64)
