@@ -62,7 +62,15 @@ fn pages_open_in_a_browser_without_error_request_or_hidden_figure() {
     let folder = tempfile::tempdir().unwrap();
     scrnn(folder.path(), "reproduce limit-cycle --epochs 20 --out cycle");
     scrnn(folder.path(), "report cycle/seed-1");
-    for (name, figures) in [("cycle", 4), ("cycle/seed-1", 5)] {
+    let sweep = format!(
+        "name = \"two\"\nexperiment = {:?}\nseeds = 2\n[set]\ntraining.epochs = 20\n[grid]\n\"training.adam.rate\" = [1e-3, 1e-2]\n\
+         \"network.groups.context.units\" = [3, 4, 5]\n",
+        root().join("assets/experiments/sinusoid_fast.toml")
+    );
+    std::fs::write(folder.path().join("two.toml"), sweep).unwrap();
+    scrnn(folder.path(), "sweep two.toml --out two");
+    scrnn(folder.path(), "compare two");
+    for (name, figures) in [("cycle", 4), ("cycle/seed-1", 5), ("two", 6)] {
         let page = folder.path().join(name).join("report.html");
         let Some(output) = look(&python, &page) else { return };
         let said = text(&output.stdout);

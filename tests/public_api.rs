@@ -9,7 +9,7 @@ use quote::ToTokens;
 use syn::{Fields, ImplItem, Item, TraitItem, UseTree, Visibility};
 
 /// The libraries, by the folder in crates/ and the name that users write.
-const LIBRARIES: [(&str, &str); 8] = [
+const LIBRARIES: [(&str, &str); 9] = [
     ("scrnn", "scrnn"),
     ("data", "scrnn_data"),
     ("sim", "scrnn_sim"),
@@ -17,6 +17,7 @@ const LIBRARIES: [(&str, &str); 8] = [
     ("run", "scrnn_run"),
     ("report", "scrnn_report"),
     ("pages", "scrnn_pages"),
+    ("sweep", "scrnn_sweep"),
     ("reproduce", "scrnn_reproduce"),
 ];
 

@@ -155,7 +155,7 @@ fn epochs(place: &Place, run: &str) -> Vec<String> {
 #[test]
 fn four_workers_that_are_killed_twenty_times_come_to_the_same_bytes_as_one_undisturbed() {
     let sweep = "seeds = 2\n[grid]\n\"training.adam.rate\" = [1e-3, 3e-3, 1e-2]\n[then.generate]\nsteps = 50\n";
-    let place = Place::new(SINE, sweep);
+    let place = Place::new(&SINE.replace("epochs = 1500", "epochs = 6000"), sweep);
     place.ends(0, "sweep s.toml --out whole --quiet");
     place.ends(0, "compare whole");
     let mut dice = Dice(7);
@@ -208,8 +208,11 @@ fn ctrl_c_and_sigterm_save_all_networks_and_the_same_command_goes_on() {
             .stdout(Stdio::null())
             .spawn()
             .unwrap();
-        wait_for("the first checkpoint", || place.path("cut/seed-2/checkpoint.safetensors").exists());
-        std::thread::sleep(Duration::from_millis(100));
+        let is_begun = |seed: u32| {
+            let folder = place.path(&format!("cut/seed-{seed}"));
+            folder.join("claim-1").exists() && folder.join("checkpoint.safetensors").exists()
+        };
+        wait_for("the work", || is_begun(1) && is_begun(2));
         Command::new("kill").args([signal, &worker.id().to_string()]).status().unwrap();
         let err = std::io::read_to_string(worker.stderr.take().unwrap()).unwrap();
         assert_eq!(worker.wait().unwrap().code(), Some(code), "{err}");

@@ -194,7 +194,7 @@ fn tests(sources: &[Text]) -> BTreeSet<&str> {
 /// Whether `name`, e.g. `kernels::panels::multiply` or `forward::Plain::step`, is defined in the file of its module.
 /// A name that begins with that of a folder of crates/, e.g. `tasks::`, is of that crate.
 fn is_defined(name: &str, sources: &[Text]) -> bool {
-    let elsewhere = ["cli", "data", "pages", "report", "reproduce", "run", "sim", "tasks"];
+    let elsewhere = ["cli", "data", "pages", "report", "reproduce", "run", "sim", "sweep", "tasks"];
     let (folder, name) = match name.split_once("::") {
         Some((place, name)) if elsewhere.contains(&place) => (format!("crates/{place}/src"), name),
         _ => ("crates/scrnn/src".to_owned(), name),
@@ -328,7 +328,8 @@ fn one_file_of_the_library_names_rayon() {
 }
 
 /// Crates whose random numbers all come from `scrnn::streams`. What stands in a file's tests may draw as it likes.
-const FROM_STREAMS: [&str; 4] = ["crates/scrnn/src/", "crates/tasks/src/", "crates/sim/src/", "crates/reproduce/src/"];
+const FROM_STREAMS: [&str; 5] =
+    ["crates/scrnn/src/", "crates/tasks/src/", "crates/sim/src/", "crates/reproduce/src/", "crates/sweep/src/"];
 
 #[test]
 fn one_file_makes_generators_of_random_numbers() {

@@ -94,7 +94,7 @@ impl Slurm {
         }
         let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
         let at = |name: &str| folder.path().join(name);
-        for name in ["state", "spool1", "spool2"] {
+        for name in ["state", "spool-n1", "spool-n2"] {
             fs::create_dir(at(name)).map_err(|error| error.to_string())?;
         }
         fs::set_permissions(folder.path(), fs::Permissions::from_mode(0o755)).map_err(|error| error.to_string())?;
@@ -115,18 +115,14 @@ impl Slurm {
              PartitionName=all Nodes=n1,n2 Default=YES MaxTime=INFINITE State=UP\n",
             shown("munge.socket"),
             shown("state"),
-            shown("spool"),
+            shown("spool-"),
             shown("ctld.pid"),
             shown("slurmd"),
             shown("ctld.log"),
             shown("slurmd"),
             base + 1,
             base + 2,
-        )
-        .replace(&format!("SlurmdSpoolDir={}%n", shown("spool")), &format!("SlurmdSpoolDir={}%n", shown("spool-")));
-        for node in ["spool-n1", "spool-n2"] {
-            fs::create_dir(at(node)).map_err(|error| error.to_string())?;
-        }
+        );
         fs::write(at("slurm.conf"), conf).map_err(|error| error.to_string())?;
         let mut slurm = Self { daemons: Vec::new(), folder };
         let at = |name: &str| slurm.folder.path().join(name);

@@ -138,7 +138,7 @@ impl SweepFile {
     pub fn of_text(name: &str, text: &str) -> Result<Self> {
         let file: Self = experiment::table(name, text).map_err(|failure| match failure {
             // Who gives an experiment file here wants to train one network.
-            failure if failure.to_string().contains("unknown field `network`") => Failure::input(
+            failure if ["data", "network", "training"].iter().any(|key| failure.to_string().contains(&format!("field `{key}`"))) => Failure::input(
                 format!("{name} is an experiment file, not a sweep file"),
                 format!(
                     "train one network with `scrnn train {name}`, or name it in a sweep file: experiment = \"{name}\""

@@ -93,10 +93,11 @@ def _results(executor: Executor, calls: Sequence[tuple[Any, ...]]) -> Iterable[s
     if executor is None:
         return (_one(*call) for call in calls)
     if getattr(executor, "__name__", None) == "ray":
+        ray: Any = executor
         # A worker that is lost is replaced, and its networks go on from their last checkpoints.
-        one = executor.remote(max_retries=20)(_one)
+        one = ray.remote(max_retries=20)(_one)
         waiting = [one.remote(*call) for call in calls]
-        return (executor.get(each) for each in waiting)
+        return (ray.get(each) for each in waiting)
     options: dict[str, Any] = {}
     if type(executor).__module__.split(".")[0] == "distributed":
         # The same call twice is two looks at one run, not one result.
