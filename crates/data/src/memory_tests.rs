@@ -280,8 +280,7 @@ fn held_on_disk(name: &str, bytes: &[u8], selection: &Selection) -> (u64, u64) {
     let mut samples = 0;
     let read = || {
         let reading = inspect(&path, selection).unwrap_or_else(|error| panic!("{name}: {error}"));
-        samples =
-            reading.data.sequences().iter().map(|one| one.values().len() * size_of::<f64>()).sum::<usize>() as u64;
+        samples = reading.data.sequences().iter().map(|one| size_of_val(one.values())).sum::<usize>() as u64;
     };
     (allocation_counter::measure(read).bytes_max, samples)
 }

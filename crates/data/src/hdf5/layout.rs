@@ -127,8 +127,7 @@ fn demos(contents: &Contents) -> Vec<Demo<'_>> {
     prefixes.extend(deeper.into_iter().filter(|prefix| *prefix != "data/"));
     for (index, prefix) in prefixes.into_iter().enumerate() {
         let Some((stem, children)) = family(contents, prefix) else { continue };
-        let called_so = DEMO.contains(&stem.to_lowercase().as_str());
-        let is_part = PARTS.contains(&stem.trim_end_matches(['_', '-']).to_lowercase().as_str());
+        let (called_so, is_part) = (is_demo(stem), is_part(stem));
         let several = children.len() > 1;
         let are_demos = match (prefix, index) {
             ("data/", _) => true,
@@ -152,7 +151,7 @@ fn prefixes_of(found: &Found) -> impl Iterator<Item = &str> {
     slashes.into_iter().take(count).map(|at| &found.path[..=at])
 }
 
-/// The largest family of groups in a group, and what their names have in common.
+/// The family of groups in a group that is called so, or else the largest, and what their names have in common.
 fn family<'c>(contents: &'c Contents, prefix: &str) -> Option<(&'c str, Children<'c>)> {
     let mut families: BTreeMap<&str, Children<'_>> = BTreeMap::new();
     for found in contents.data_sets.iter().filter(|found| is_series(found)) {
@@ -166,7 +165,15 @@ fn family<'c>(contents: &'c Contents, prefix: &str) -> Option<(&'c str, Children
             families.entry(stem).or_default().entry(child).or_default().insert(member, found);
         }
     }
-    families.into_iter().max_by_key(|(_, children)| children.len())
+    families.into_iter().max_by_key(|(stem, children)| (is_demo(stem), !is_part(stem), children.len()))
+}
+
+fn is_demo(stem: &str) -> bool {
+    DEMO.contains(&stem.to_lowercase().as_str())
+}
+
+fn is_part(stem: &str) -> bool {
+    PARTS.contains(&stem.trim_end_matches(['_', '-']).to_lowercase().as_str())
 }
 
 /// Whether something that all of them have has other lengths in some: parts of one recording have one.

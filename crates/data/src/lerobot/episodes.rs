@@ -34,6 +34,9 @@ struct Stretch {
     at: usize,
 }
 
+/// What is done with a row of a column: the episode, the number within it, the number within the group, and the values.
+type EachRow<'e> = &'e mut dyn FnMut(&mut Episode, usize, usize, &[f64]) -> Result<(), FormatProblem>;
+
 /// The value in a row of a column of whole numbers.
 fn whole(values: &[f64], row: usize, name: Option<&String>) -> Result<i64, FormatProblem> {
     match *values {
@@ -166,8 +169,7 @@ impl Episodes {
         Ok(())
     }
 
-    /// Calls `each` with the episode, the number within it, the number within the group, and the values of each row of a
-    /// column.
+    /// Calls `each` with each row of a column.
     fn each_row(
         &mut self,
         file: &Parquet<'_>,
@@ -175,7 +177,7 @@ impl Episodes {
         stretches: &[Stretch],
         leaf: usize,
         budget: &Budget,
-        each: &mut dyn FnMut(&mut Episode, usize, usize, &[f64]) -> Result<(), FormatProblem>,
+        each: EachRow<'_>,
     ) -> Result<(), FormatProblem> {
         let mut coming = stretches.iter();
         let mut now: Option<&Stretch> = None;
