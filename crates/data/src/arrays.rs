@@ -466,7 +466,7 @@ fn guessed(path: &str, name: &str, shape: &[usize], values: &[f64]) -> Result<Ax
 
 /// Whether values go on smoothly along the first axis, and jump along the second. Steps of a movement are small beside
 /// its extent; joints beside each other are as far apart as any two values.
-pub fn first_is_time(n: usize, t: usize, c: usize, values: &[f64]) -> bool {
+pub(crate) fn first_is_time(n: usize, t: usize, c: usize, values: &[f64]) -> bool {
     if n <= t || values.len() != n * t * c {
         return false;
     }

@@ -41,7 +41,7 @@ pub struct Track {
 
 /// Takes what stands from a place on out of a list, which gives its room back: where many sequences are cut from one list, the
 /// samples are held once.
-pub fn split_off(values: &mut Vec<f64>, from: usize) -> Vec<f64> {
+pub(crate) fn split_off(values: &mut Vec<f64>, from: usize) -> Vec<f64> {
     let rest = values.split_off(from.min(values.len()));
     // Not each time: where the system copies, that would be for each sequence all that is left.
     if values.capacity() - values.len() > values.capacity() / 16 {

@@ -102,7 +102,7 @@ impl<'a> Source<'a> {
     ///
     /// # Errors
     /// [`FileError::Disk`].
-    pub fn file(&self) -> Result<Option<(std::fs::File, u64)>, FileError> {
+    pub(crate) fn file(&self) -> Result<Option<(std::fs::File, u64)>, FileError> {
         let disk = |source| FileError::disk("read", self.path, source);
         if self.bytes.is_some() || !std::fs::metadata(self.path).map_err(disk)?.is_file() {
             return Ok(None);
