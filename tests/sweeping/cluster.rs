@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use crate::{Place, SINE, same_files, wait_for};
 
-/// A stand-in for `sbatch`: runs all tasks of the array one after the other, and one of them again after it was killed.
+/// A stand-in for `sbatch`: runs all tasks of the array one after the other, and one of them again after it was told to end.
 const SBATCH: &str = r#"#!/bin/sh
 for script; do :; done
 tasks=$(sed -n 's/^#SBATCH --array=1-//p' "$script")
@@ -16,7 +16,7 @@ export SLURM_ARRAY_JOB_ID=7
 for SLURM_ARRAY_TASK_ID in $(seq "$tasks"); do
     export SLURM_ARRAY_TASK_ID
     if [ "$SLURM_ARRAY_TASK_ID" = 2 ]; then
-        timeout --signal=KILL 0.3 sh "$script" >/dev/null 2>&1
+        timeout --signal=TERM 0.3 sh "$script" >/dev/null 2>&1
     fi
     sh "$script" >/dev/null 2>&1 || exit 1
 done

@@ -7,8 +7,8 @@ use scrnn::engine::InstructionSet;
 
 use crate::args::Shared;
 use crate::command::{
-    compare, completions, convert, data, evaluate, export, generate, inspect, recognize, report, reproduce, simulate,
-    sweep, train, view,
+    compare, completions, convert, data, evaluate, export, generate, inspect, recognize, report, reproduce, schema,
+    simulate, sweep, train, view,
 };
 
 static VERSION: LazyLock<String> =
@@ -75,12 +75,7 @@ pub enum Command {
     Inspect(inspect::Arguments),
     Convert(convert::Arguments),
     Export(export::Arguments),
-    /// Print the JSON schema of the experiment file
-    ///
-    /// Editors with a TOML language server complete and check an experiment file that begins with
-    ///   #:schema ./scrnn.schema.json
-    #[command(verbatim_doc_comment, after_help = "Example:\n  scrnn schema > scrnn.schema.json")]
-    Schema,
+    Schema(schema::Arguments),
     Completions(completions::Arguments),
 }
 

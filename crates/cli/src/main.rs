@@ -45,7 +45,7 @@ fn run() -> u8 {
         Command::Inspect(arguments) => command::inspect::run(&arguments, &shared),
         Command::Convert(arguments) => command::convert::run(&arguments, &shared),
         Command::Export(arguments) => command::export::run(&arguments, &shared),
-        Command::Schema => command::schema::run(),
+        Command::Schema(arguments) => command::schema::run(&arguments),
         Command::Completions(arguments) => command::completions::run(&arguments),
     };
     code(ending, signals.code())

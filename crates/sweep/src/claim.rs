@@ -327,10 +327,13 @@ impl Drop for Written {
     }
 }
 
+/// Claims, each with what ends its work.
+type Held = Arc<Mutex<Vec<(Arc<Claim>, Interrupt)>>>;
+
 /// Keeps the claims of a process alive, and passes on to each run that somebody wants to stop, or has taken it over.
 #[derive(Debug)]
 pub struct Keeper {
-    held: Arc<Mutex<Vec<(Arc<Claim>, Interrupt)>>>,
+    held: Held,
     end: Interrupt,
     thread: Option<thread::JoinHandle<()>>,
 }
@@ -339,7 +342,7 @@ impl Keeper {
     /// For claims that others take over after `patience`.
     #[must_use]
     pub fn new(interrupt: &Interrupt, patience: Duration) -> Self {
-        let held: Arc<Mutex<Vec<(Arc<Claim>, Interrupt)>>> = Arc::default();
+        let held: Held = Arc::default();
         let end = Interrupt::new();
         let (seen, over, asked) = (Arc::clone(&held), end.clone(), interrupt.clone());
         let looks = ((patience / RENEWALS).as_millis() / LOOK.as_millis()).max(1);

@@ -44,7 +44,7 @@ fn figure(file: &str, title: &str, caption: String, chart: Chart) -> Block {
 /// A number on a page.
 pub fn short(value: f64) -> String {
     match value.abs() {
-        none if none == 0.0 => "0".to_owned(),
+        0.0 => "0".to_owned(),
         size if !(1e-3..1e5).contains(&size) => format!("{value:.3e}"),
         size if size >= 100.0 => format!("{value:.1}"),
         _ => format!("{value:.4}"),
@@ -232,12 +232,15 @@ fn thinned(curve: &[(f64, f64)], most: usize) -> Vec<(f64, f64)> {
     thin
 }
 
+/// The setting of a run, its learning curve, and whether that is the nll.
+type Curve = (usize, Vec<(f64, f64)>, bool);
+
 /// Learning curves over each other: a colour for each of a few settings, a panel for each of several.
 pub fn learning(collected: &Collected, order: &[usize]) -> Option<Block> {
     let drawn: Vec<usize> = order.iter().copied().take(PANELS).collect();
     let runs: Vec<&Row> = drawn.iter().flat_map(|&setting| collected.of(setting)).take(CURVES).collect();
     let most = (POINTS / runs.len().max(1)).clamp(OF_CURVE.0, OF_CURVE.1);
-    let curves: Vec<(usize, Vec<(f64, f64)>, bool)> = (runs.iter())
+    let curves: Vec<Curve> = (runs.iter())
         .map(|run| {
             let (curve, with_variance) = run.curve();
             (run.setting, thinned(&curve, most), with_variance)
