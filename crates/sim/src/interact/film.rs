@@ -2,8 +2,10 @@
 
 use std::io::Cursor;
 
+use scrnn::analysis::excursions::Side;
+
 use super::interaction::{CHANNELS, Interaction};
-use super::order::{PERIOD, Side, branchings};
+use super::order::{PERIOD, branchings};
 use crate::recording::{Heading, Joint, Recorder, RecordingError, Robot};
 use crate::robot::joints::{HEAD, RIGHT_ARM};
 use crate::robot::nao;
