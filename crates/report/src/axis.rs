@@ -67,7 +67,7 @@ impl Axis {
 
 /// A number on an axis whose numbers are so far apart.
 fn shown(value: f64, step: f64) -> String {
-    if value != 0.0 && (step < 1e-3 || step >= 1e6) {
+    if value != 0.0 && !(1e-3..1e6).contains(&step) {
         return format!("{value:.0e}");
     }
     let digits = (-step.log10() - 1e-9).ceil().clamp(0.0, 6.0) as usize;

@@ -229,6 +229,9 @@ const LEGEND_ROW: f64 = 52.0;
 /// Points of a panel that can have labels.
 const LABELLED: usize = 300;
 
+/// Where a point of a panel lies on the paper.
+type Placing<'a> = &'a dyn Fn((f64, f64)) -> (f64, f64);
+
 /// What all panels of a chart have in common.
 struct Layout {
     /// Of tick labels and titles.
@@ -499,7 +502,7 @@ impl Chart {
         &self,
         paper: &mut Paper,
         panel: &Panel,
-        (size, at): (f64, &dyn Fn((f64, f64)) -> (f64, f64)),
+        (size, at): (f64, Placing<'_>),
         (left, top, right, bottom): (f64, f64, f64, f64),
     ) {
         let radius = if self.small() { 5.0 } else { 8.0 };

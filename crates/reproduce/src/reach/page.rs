@@ -159,7 +159,7 @@ fn touch_samples(cycles: &[Cycle]) -> impl Iterator<Item = usize> {
 
 /// Fig. 4.6.
 fn phase_plots(material: &Material) -> Block {
-    let names = ["position 1", "between 1 and 2", "position 2", "between 2 and 3", "position 3"];
+    let names = ["1", "1-2", "2", "2-3", "3"];
     let pairs = [("shoulder", "RShoulderPitch", "RShoulderRoll"), ("elbow", "RElbowYaw", "RElbowRoll")];
     let mut panels = Vec::new();
     for (what, a, b) in pairs {
@@ -180,7 +180,7 @@ fn phase_plots(material: &Material) -> Block {
             let at = |sample: &[f64]| (sample[channel(a)], sample[channel(b)]);
             let points: Vec<(f64, f64)> = one.samples.chunks_exact(REACHING.len()).map(at).collect();
             let touches = touch_samples(&one.cycles).filter_map(|k| points.get(k).copied()).collect();
-            panels.push(phase(format!("{what}, data, {name}"), points, touches, Tone::Data));
+            panels.push(phase(format!("{what} data {name}"), points, touches, Tone::Data));
         }
     }
     for (what, a, b) in pairs {
@@ -189,7 +189,7 @@ fn phase_plots(material: &Material) -> Block {
             let points: Vec<(f64, f64)> = given.performed.decisions.iter().take(15 * CYCLE).map(at).collect();
             let touches = touch_samples(&given.performed.cycles).filter_map(|k| points.get(k.checked_sub(1)?).copied());
             let touches = touches.collect();
-            panels.push(phase(format!("{what}, output, {name}"), points, touches, Tone::Ours));
+            panels.push(phase(format!("{what} output {name}"), points, touches, Tone::Ours));
         }
     }
     if let Some((a, b)) = two_units(material) {
@@ -201,7 +201,7 @@ fn phase_plots(material: &Material) -> Block {
             panels.push(Panel {
                 x: (-1.05, 1.05),
                 y: (-1.05, 1.05),
-                ..phase(format!("units {} and {}, {name}", a + 1, b + 1), points, touches, Tone::Ours)
+                ..phase(format!("units {}, {}: {name}", a + 1, b + 1), points, touches, Tone::Ours)
             });
         }
     }
@@ -210,7 +210,7 @@ fn phase_plots(material: &Material) -> Block {
         "phase-plots",
         "Phase plots",
         "Shoulder (roll over pitch) and elbow (roll over yaw) in a demonstration and in the network's output over 15 cycles, and \
-         two context units, for places from right to left; half way between positions nothing was taught. Dots mark touches.",
+         two context units, for positions 1 to 3 from right to left; half way between them (1-2, 2-3) nothing was taught. Dots mark touches.",
         "Fig. 4.6: trajectories converge at the touch and diverge after it, and those for new places lie between those of their \
          neighbours.",
         chart,
