@@ -268,21 +268,6 @@ fn damaged_bytes_never_panic() {
 }
 
 #[test]
-fn damaged_files_come_to_the_same_on_the_disk_and_in_memory() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("x.h5");
-    for name in ["small.hdf5", "flags.h5", "one_more.h5"] {
-        damage(&fixture(name), 60, BUDGET, |bytes| {
-            std::fs::write(&path, bytes).unwrap();
-            let outcome = |read: Result<Reading, FileError>| read.map(|reading| format!("{:?}", reading.data)).ok();
-            let selection = Selection::default();
-            let on_disk = outcome(crate::inspect(&path, &selection));
-            assert_eq!(on_disk, outcome(inspect_bytes(&path, bytes, &selection)), "{name}");
-        });
-    }
-}
-
-#[test]
 fn promises_of_terabytes_cost_nothing() {
     let mut bytes = fixture("axes.h5");
     // The lengths of `sideways`, and the most that they may grow to.
