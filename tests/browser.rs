@@ -70,7 +70,7 @@ fn pages_open_in_a_browser_without_error_request_or_hidden_figure() {
     std::fs::write(folder.path().join("two.toml"), sweep).unwrap();
     scrnn(folder.path(), "sweep two.toml --out two");
     scrnn(folder.path(), "compare two");
-    for (name, figures) in [("cycle", 4), ("cycle/seed-1", 5), ("two", 6)] {
+    for (name, figures) in [("cycle", 4), ("cycle/seed-1", 5), ("two", 7)] {
         let page = folder.path().join(name).join("report.html");
         let Some(output) = look(&python, &page) else { return };
         let said = text(&output.stdout);
