@@ -34,6 +34,8 @@ def test_the_example_holds(example: Any, trained: scrnn.SCTRNN, tmp_path: Path) 
     new = [0.8 * wave, 0.7 * wave[::-1]]
     net = example_network(wave)
     example.globs.update(scrnn=scrnn, np=np, os=os, net=net, wave=wave, new=new, folder=tmp_path)
+    if any("swept." in one.source and "swept =" not in one.source for one in example.examples):
+        example.globs["swept"] = example_sweep(tmp_path)
     runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.IGNORE_EXCEPTION_DETAIL * 0)
     runner.run(example)
     assert runner.failures == 0
@@ -49,6 +51,15 @@ def example_network(wave: Any) -> scrnn.SCTRNN:
         net = scrnn.SCTRNN(units=6, time_constant=3.0, epochs=400)
         _NETWORK.append(net.fit([wave, other], channels=["a", "b"], names=["slow", "fast"]))
     return copy.copy(_NETWORK[0])
+
+
+def example_sweep(folder: Path) -> scrnn.Swept:
+    """Two networks, trained for each example that asks for them."""
+    network = '[[network.groups]]\nname = "context"\nunits = 3\ntime_constant = 2.0\n'
+    training = '[training]\nepochs = 20\noptimiser = "adam"\n'
+    (folder / "sine.toml").write_text('name = "sine"\n[data]\ntask = "sinusoid"\nsteps = 40\n' + network + training)
+    (folder / "two.toml").write_text('name = "two"\nexperiment = "sine.toml"\nseeds = 2\n[then]\nreport = false\n')
+    return scrnn.sweep(folder / "two.toml", out=folder / "two")
 
 
 def public() -> list[Any]:

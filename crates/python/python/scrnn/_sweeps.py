@@ -48,12 +48,20 @@ class Swept(Report):
         return page(repr(self), f"<pre>{html.escape(self.words)}</pre>")
 
     def status(self) -> dict[str, Any]:
-        """How far the sweep is now, as ``scrnn sweep --status --json``."""
+        """How far the sweep is now, as ``scrnn sweep --status --json``.
+
+        >>> swept.status()["finished"]
+        2
+        """
         found: dict[str, Any] = json.loads(_scrnn.sweep_status(self.folder)[1])
         return found
 
     def compare(self) -> Compared:
-        """The page and the numbers, as `scrnn.compare`."""
+        """The page and the numbers, as `scrnn.compare`.
+
+        >>> len(swept.compare().rows)
+        2
+        """
         return compare(self.folder)
 
 
@@ -156,11 +164,15 @@ def compare(*paths: Path, out: Path | None = None) -> Compared:
 
     Raises:
         scrnn.Error: There is nothing to compare.
+        scrnn.FileError: The disk refuses.
 
+    >>> compared = scrnn.compare(swept.folder, out=folder / "page")
+    >>> os.path.basename(compared.page), compared["measure"]
+    ('report.html', 'nll')
     >>> scrnn.compare(folder / "nothing", out=folder / "page")
     Traceback (most recent call last):
     ...
-    scrnn.Error: ...
+    scrnn.FileError: ...
     """
     if out is None and len(paths) != 1:
         raise _scrnn.Error("runs have no common folder for their page\nsay where to write it: out=...")
