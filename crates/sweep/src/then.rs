@@ -1,4 +1,4 @@
-//! What is done with each trained network: the sweep file's [then], and the work itself.
+//! What is done with each trained network: the sweep file's `[then]`, and the work itself.
 //!
 //! What comes of it lies in the run folder, and its numbers among the measures.
 

@@ -1,6 +1,6 @@
 //! A training while it goes on, as a page on this machine: how it learns, what its best network does on its own, time left.
 //!
-//! What the page shows is what a [`messages::Progress`] is told anyway, and what stands in the run folder: nothing is asked of the
+//! What the page shows is what a [`Progress`] is told anyway, and what stands in the run folder: nothing is asked of the
 //! training, and no number in it changes.
 
 use std::collections::HashMap;
