@@ -14,7 +14,7 @@
 use pulp::Simd;
 
 use crate::batch::Block;
-use crate::kernels::copy_few;
+use crate::kernels::element::Element;
 use crate::kernels::outer::{Rows, Taken, accumulate};
 use crate::kernels::panels::{Columns, Product, multiply};
 use crate::packed::Packed;
@@ -22,26 +22,26 @@ use crate::trajectory::Trajectory;
 
 /// `before <- (1 - c^2) sum + (1 - 1/tau) after` for the context units of `columns` columns (2.22).
 #[inline(always)]
-pub(crate) fn retreat<S: Simd>(
+pub(crate) fn retreat<S: Simd, E: Element>(
     simd: S,
-    packed: &Packed,
-    sums: &[f64],
-    states: &[f64],
-    after: &[f64],
-    before: &mut [f64],
+    packed: &Packed<E>,
+    sums: &[E],
+    states: &[E],
+    after: &[E],
+    before: &mut [E],
     columns: usize,
 ) {
     let rows = packed.backward.rows();
-    let (decay, _) = S::as_simd_f64s(&packed.decay[..rows]);
+    let decay = E::vectors::<S>(&packed.decay[..rows]);
     for column in 0..columns {
         let delta = column * packed.delta_stride;
-        let (sums, _) = S::as_simd_f64s(&sums[column * rows..][..rows]);
-        let (c, _) = S::as_simd_f64s(&states[column * packed.state_stride..][..rows]);
-        let (after, _) = S::as_simd_f64s(&after[delta..][..rows]);
-        let (before, _) = S::as_mut_simd_f64s(&mut before[delta..][..rows]);
+        let sums = E::vectors::<S>(&sums[column * rows..][..rows]);
+        let c = E::vectors::<S>(&states[column * packed.state_stride..][..rows]);
+        let after = E::vectors::<S>(&after[delta..][..rows]);
+        let before = E::vectors_mut::<S>(&mut before[delta..][..rows]);
         for ((((before, after), c), sum), decay) in before.iter_mut().zip(after).zip(c).zip(sums).zip(decay) {
-            let slope = simd.negate_mul_add_f64s(*c, *c, simd.splat_f64s(1.0));
-            *before = simd.mul_add_f64s(slope, *sum, simd.mul_f64s(*decay, *after));
+            let slope = E::negate_mul_add(simd, *c, *c, E::splat(simd, E::ONE));
+            *before = E::mul_add(simd, slope, *sum, E::mul(simd, *decay, *after));
         }
     }
 }
@@ -49,13 +49,13 @@ pub(crate) fn retreat<S: Simd>(
 /// Goes back through the products of `range`, a segment of the span that starts at `span_start`. The delta row behind
 /// the segment's last product must hold d/du of the step after it; afterwards, row 0 holds d/du of the segment's start.
 #[inline(always)]
-pub(crate) fn run<S: Simd>(
+pub(crate) fn run<S: Simd, E: Element>(
     simd: S,
-    packed: &Packed,
+    packed: &Packed<E>,
     block: &Block,
     range: std::ops::Range<usize>,
     span_start: usize,
-    trajectory: &mut Trajectory,
+    trajectory: &mut Trajectory<E>,
 ) {
     let (n, n_y, n_c) = (block.columns(), packed.n_y, packed.n_c);
     let (state_stride, delta_stride) = (packed.state_stride, packed.delta_stride);
@@ -68,16 +68,16 @@ pub(crate) fn run<S: Simd>(
         for column in 0..active {
             let delta = &mut after[column * delta_stride..][..n_c + packed.n_out];
             if column >= later {
-                delta[..n_c].fill(0.0);
+                delta[..n_c].fill(E::ZERO);
             }
             let outputs = &mut delta[n_c..];
             if k == 0 {
-                outputs.fill(0.0);
+                outputs.fill(E::ZERO);
             } else {
                 let step = ((k - 1) * n + column) * n_y;
-                copy_few(&mut outputs[..n_y], &trajectory.mean[step..step + n_y]);
+                E::take(&mut outputs[..n_y], &trajectory.mean[step..step + n_y]);
                 if packed.n_out > n_y {
-                    copy_few(&mut outputs[n_y..], &trajectory.variance[step..step + n_y]);
+                    E::take(&mut outputs[n_y..], &trajectory.variance[step..step + n_y]);
                 }
             }
         }
@@ -96,14 +96,14 @@ pub(crate) fn run<S: Simd>(
 /// Adds the outer products of a segment to the gradient of [`Packed::gradient_len`] values: between two ends of columns all
 /// steps at once.
 #[inline(always)]
-pub(crate) fn gather<S: Simd>(
+pub(crate) fn gather<S: Simd, E: Element>(
     simd: S,
-    packed: &Packed,
+    packed: &Packed<E>,
     block: &Block,
     range: std::ops::Range<usize>,
     span_start: usize,
-    trajectory: &Trajectory,
-    gradient: &mut [f64],
+    trajectory: &Trajectory<E>,
+    gradient: &mut [E],
 ) {
     let n = block.columns();
     let (context, input) = gradient.split_at_mut(packed.gradient_split());

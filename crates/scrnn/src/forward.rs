@@ -19,8 +19,7 @@ use crate::batch::Block;
 use crate::dataset::Sequence;
 use crate::error::{Error, Result};
 use crate::features::{Features, Past};
-use crate::kernels::activation::tanh_rows;
-use crate::kernels::copy_few;
+use crate::kernels::element::Element;
 use crate::kernels::panels::{Columns, Product, multiply};
 use crate::network::Network;
 use crate::packed::Packed;
@@ -130,60 +129,66 @@ impl<'a> Plain<'a> {
 
 /// `c <- tanh u` for `columns` columns.
 #[inline(always)]
-pub(crate) fn activate<S: Simd>(simd: S, packed: &Packed, internal: &[f64], states: &mut [f64], columns: usize) {
+pub(crate) fn activate<S: Simd, E: Element>(
+    simd: S,
+    packed: &Packed<E>,
+    internal: &[E],
+    states: &mut [E],
+    columns: usize,
+) {
     for column in 0..columns {
         let u = &internal[column * packed.rows..][..packed.rows];
-        tanh_rows(simd, u, &mut states[column * packed.state_stride..][..packed.rows]);
+        E::tanh_rows(simd, u, &mut states[column * packed.state_stride..][..packed.rows]);
     }
 }
 
 /// `u <- (1 - 1/tau) u + drive`, `c <- tanh u` for `columns` columns (2.2), (2.3).
 #[inline(always)]
-pub(crate) fn advance<S: Simd>(
+pub(crate) fn advance<S: Simd, E: Element>(
     simd: S,
-    packed: &Packed,
-    drive: &[f64],
-    internal: &mut [f64],
-    states: &mut [f64],
+    packed: &Packed<E>,
+    drive: &[E],
+    internal: &mut [E],
+    states: &mut [E],
     columns: usize,
 ) {
-    let (decay, _) = S::as_simd_f64s(&packed.decay);
+    let decay = E::vectors::<S>(&packed.decay);
     for column in 0..columns {
-        let (drive, _) = S::as_simd_f64s(&drive[column * packed.rows..][..packed.rows]);
+        let drive = E::vectors::<S>(&drive[column * packed.rows..][..packed.rows]);
         let internal = &mut internal[column * packed.rows..][..packed.rows];
-        let (u, _) = S::as_mut_simd_f64s(internal);
+        let u = E::vectors_mut::<S>(internal);
         for ((u, drive), decay) in u.iter_mut().zip(drive).zip(decay) {
-            *u = simd.mul_add_f64s(*decay, *u, *drive);
+            *u = E::mul_add(simd, *decay, *u, *drive);
         }
-        tanh_rows(simd, internal, &mut states[column * packed.state_stride..][..packed.rows]);
+        E::tanh_rows(simd, internal, &mut states[column * packed.state_stride..][..packed.rows]);
     }
 }
 
 /// Puts initial states, one of N_C values for each run, into the running internal states.
-pub(crate) fn start(packed: &Packed, block: &Block, initial: &[f64], trajectory: &mut Trajectory) {
+pub(crate) fn start<E: Element>(packed: &Packed<E>, block: &Block, initial: &[f64], trajectory: &mut Trajectory<E>) {
     for (&run, u) in block.runs.iter().zip(trajectory.internal.chunks_exact_mut(packed.rows)) {
-        u.fill(0.0);
-        u[..packed.n_c].copy_from_slice(&initial[run * packed.n_c..(run + 1) * packed.n_c]);
+        u.fill(E::ZERO);
+        E::take(&mut u[..packed.n_c], &initial[run * packed.n_c..(run + 1) * packed.n_c]);
     }
 }
 
 /// Prepares a span: its inputs, and the context where it starts. A column that has ended needs no input.
 #[inline(always)]
-pub(crate) fn enter_span<S: Simd>(
+pub(crate) fn enter_span<S: Simd, E: Element>(
     simd: S,
-    packed: &Packed,
+    packed: &Packed<E>,
     block: &Block,
     sequences: &[Sequence],
     span: std::ops::Range<usize>,
-    trajectory: &mut Trajectory,
+    trajectory: &mut Trajectory<E>,
 ) {
     let (n, stride) = (block.columns(), packed.state_stride);
     for (column, &sequence) in block.sequences.iter().enumerate() {
         let inputs = sequences[sequence].values().chunks_exact(packed.n_x).skip(span.start).take(span.len());
         for (x, states) in inputs.zip(trajectory.states.chunks_exact_mut(n * stride)) {
             let state = &mut states[column * stride..(column + 1) * stride];
-            copy_few(&mut state[packed.rows..packed.rows + packed.n_x], x);
-            state[packed.rows + packed.n_x] = 1.0;
+            E::take(&mut state[packed.rows..packed.rows + packed.n_x], x);
+            state[packed.rows + packed.n_x] = E::ONE;
         }
     }
     activate(simd, packed, &trajectory.internal, &mut trajectory.states, n);
@@ -191,14 +196,14 @@ pub(crate) fn enter_span<S: Simd>(
 
 /// Runs the products of `range`, which lies in the span that starts at `span_start`; `record` keeps the outputs.
 #[inline(always)]
-pub(crate) fn run<S: Simd>(
+pub(crate) fn run<S: Simd, E: Element>(
     simd: S,
-    packed: &Packed,
+    packed: &Packed<E>,
     block: &Block,
     range: std::ops::Range<usize>,
     span_start: usize,
     record: bool,
-    trajectory: &mut Trajectory,
+    trajectory: &mut Trajectory<E>,
 ) {
     let (n, stride, rows) = (block.columns(), packed.state_stride, packed.rows);
     let (n_y, n_c) = (packed.n_y, packed.n_c);
@@ -223,10 +228,10 @@ pub(crate) fn run<S: Simd>(
                     false => &next[column * stride + n_c..][..n_y],
                     true => &internal[column * rows + n_c..][..n_y],
                 };
-                copy_few(&mut trajectory.mean[out + column * n_y..][..n_y], y);
+                E::give(y, &mut trajectory.mean[out + column * n_y..][..n_y]);
                 if variance {
                     let u = &internal[column * rows + n_c + n_y..][..n_y];
-                    copy_few(&mut trajectory.variance[out + column * n_y..][..n_y], u);
+                    E::give(u, &mut trajectory.variance[out + column * n_y..][..n_y]);
                 }
             }
         }

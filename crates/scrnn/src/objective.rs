@@ -19,6 +19,7 @@ use crate::topology::Topology;
 
 mod closed;
 mod cpu;
+mod taught;
 
 /// Makes objectives.
 pub trait Backend {
@@ -41,6 +42,24 @@ pub struct Request<'a> {
     pub recompute: bool,
     /// How runs that go on in a closed loop count. A backend that cannot run them must refuse.
     pub closed_loop: Option<ClosedLoopTerm>,
+    /// What states and products are computed in. A backend that has one way only may take it, and says which by
+    /// [`Objective::numerics`].
+    pub precision: Precision,
+}
+
+/// The numbers that states, weights and their products are computed in. The likelihood, and sums over a whole sequence, are float64
+/// in any case, and so are runs that go step by step: in a closed loop, or past missing values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[non_exhaustive]
+pub enum Precision {
+    /// float64.
+    #[default]
+    F64,
+    /// float32: faster, with gradients to some six digits. Its bits differ from those of float64, and are the same for any number of
+    /// threads and any instruction set, too.
+    F32,
 }
 
 /// The likelihood of closed loops: what the network predicts of a sequence when it runs on what it predicted itself.
@@ -91,7 +110,7 @@ impl<'a> Request<'a> {
     /// Without recomputation.
     #[must_use]
     pub fn new(topology: &'a Topology, data: &'a Dataset) -> Self {
-        Self { topology, data, recompute: false, closed_loop: None }
+        Self { topology, data, recompute: false, closed_loop: None, precision: Precision::F64 }
     }
 }
 

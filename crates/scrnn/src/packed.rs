@@ -13,14 +13,14 @@
 use aligned_vec::AVec;
 
 use crate::engine::InstructionSet;
+use crate::kernels::element::Element;
 use crate::kernels::panels::{Panels, chains_for};
-use crate::kernels::{padded, stride};
 use crate::parameters::{Block, Gradients, Parameters};
 use crate::topology::Topology;
 
 /// Weights in panels, and the layout of the rows that they are multiplied with.
 #[derive(Debug, Clone)]
-pub(crate) struct Packed {
+pub(crate) struct Packed<E: Element = f64> {
     /// N_C.
     pub n_c: usize,
     /// N_I.
@@ -37,47 +37,47 @@ pub(crate) struct Packed {
     pub state_stride: usize,
     /// A delta row holds the gradients of the context's and the outputs' internal states.
     pub delta_stride: usize,
-    pub from_context: Panels,
-    pub from_input: Panels,
-    pub bias: AVec<f64>,
+    pub from_context: Panels<E>,
+    pub from_input: Panels<E>,
+    pub bias: AVec<E>,
     /// 1 - 1/tau for context rows, 0 for output rows.
-    pub decay: AVec<f64>,
+    pub decay: AVec<E>,
     /// 1/tau for context rows, 1 for output rows.
     pub rate: AVec<f64>,
     /// Rows: context units (from); inner: context units, then outputs (to).
-    pub backward: Panels,
+    pub backward: Panels<E>,
     /// The output rows alone, for loops that need the prediction before the next input.
-    pub outputs: Panels,
+    pub outputs: Panels<E>,
     /// The input does not reach the outputs: zeros, so that both products have one form.
-    pub outputs_from_input: Panels,
-    pub output_bias: AVec<f64>,
+    pub outputs_from_input: Panels<E>,
+    pub output_bias: AVec<E>,
     /// Back from the context to the input. Rows: inputs.
-    pub to_input: Panels,
+    pub to_input: Panels<E>,
     /// The variance floor.
     pub floor: f64,
     /// Whether the mean units are linear.
     pub linear_mean: bool,
     /// Start of sums that start from nothing.
-    pub zeros: AVec<f64>,
+    pub zeros: AVec<E>,
     receives: Vec<bool>,
     drives: Vec<bool>,
 }
 
-fn filled(count: usize, value: f64) -> AVec<f64> {
+fn filled<E: Element>(count: usize, value: E) -> AVec<E> {
     AVec::from_iter(64, std::iter::repeat_n(value, count))
 }
 
-impl Packed {
+impl<E: Element> Packed<E> {
     pub fn new(topology: &Topology, set: InstructionSet) -> Self {
         let (n_c, n_x, n_out) = (topology.context_units(), topology.inputs(), topology.output_units());
-        let rows = padded(n_c + n_out);
-        let mut decay = filled(rows, 0.0);
+        let rows = E::padded(n_c + n_out);
+        let mut decay = filled(rows, E::ZERO);
         let mut rate = filled(rows, 1.0);
         for (i, tau) in topology.time_constants().into_iter().enumerate() {
-            decay[i] = 1.0 - 1.0 / tau;
+            decay[i] = E::from_f64(1.0 - 1.0 / tau);
             rate[i] = 1.0 / tau;
         }
-        let panels = |rows, inner| Panels::zeros(rows, inner, chains_for(rows), set);
+        let panels = |rows, inner| Panels::zeros(rows, inner, chains_for::<E>(rows), set);
         Self {
             n_c,
             n_x,
@@ -85,21 +85,21 @@ impl Packed {
             delay: topology.delay(),
             n_out,
             rows,
-            state_stride: stride(rows + n_x + 1),
-            delta_stride: stride(rows),
+            state_stride: E::stride(rows + n_x + 1),
+            delta_stride: E::stride(rows),
             from_context: panels(rows, n_c),
             from_input: panels(rows, n_x),
-            bias: filled(rows, 0.0),
+            bias: filled(rows, E::ZERO),
             decay,
             rate,
             backward: panels(n_c, n_c + n_out),
             outputs: panels(n_out, n_c),
             outputs_from_input: panels(n_out, n_x),
-            output_bias: filled(padded(n_out), 0.0),
+            output_bias: filled(E::padded(n_out), E::ZERO),
             to_input: panels(n_x, n_c),
             floor: topology.variance_floor(),
             linear_mean: topology.has_linear_mean(),
-            zeros: filled(rows.max(padded(n_x)), 0.0),
+            zeros: filled(rows.max(E::padded(n_x)), E::ZERO),
             receives: topology.per_unit(|group| group.receives_input).collect(),
             drives: topology.per_unit(|group| group.drives_output).collect(),
         }
@@ -124,11 +124,11 @@ impl Packed {
         self.outputs.fill(self.n_out, output);
         self.to_input.fill(n_x, |i, k| rate[k] * w_cx[k * n_x + i]);
         for (i, b) in b_c.iter().enumerate() {
-            self.bias[i] = self.rate[i] * b;
+            self.bias[i] = E::from_f64(self.rate[i] * b);
         }
         for (o, b) in b_y.iter().chain(b_v).enumerate() {
-            self.bias[n_c + o] = *b;
-            self.output_bias[o] = *b;
+            self.bias[n_c + o] = E::from_f64(*b);
+            self.output_bias[o] = E::from_f64(*b);
         }
     }
 

@@ -7,6 +7,7 @@
 use aligned_vec::AVec;
 
 use crate::batch::Block;
+use crate::kernels::element::Element;
 use crate::packed::Packed;
 
 /// Bytes of states and deltas that a segment may take.
@@ -26,8 +27,8 @@ pub(crate) struct Cut {
 }
 
 impl Cut {
-    pub fn new(packed: &Packed, block: &Block, recompute: bool) -> Self {
-        let row = (packed.state_stride + packed.delta_stride) * size_of::<f64>();
+    pub fn new<E: Element>(packed: &Packed<E>, block: &Block, recompute: bool) -> Self {
+        let row = (packed.state_stride + packed.delta_stride) * size_of::<E>();
         let rows = (SEGMENT_BYTES / row).max(SEGMENT_ROWS);
         let products = block.steps() + 1;
         let segment = (rows / block.columns()).clamp(1, products);
@@ -52,21 +53,21 @@ impl Cut {
 
 /// The record.
 #[derive(Debug)]
-pub(crate) struct Trajectory {
+pub(crate) struct Trajectory<E: Element = f64> {
     /// [product - span start][column][state_stride]: c_k, x_k, 1.
-    pub states: AVec<f64>,
+    pub states: AVec<E>,
     /// [column][rows]: the running internal states.
-    pub internal: AVec<f64>,
+    pub internal: AVec<E>,
     /// [column][rows]: what the products of one step give.
-    pub drive: AVec<f64>,
+    pub drive: AVec<E>,
     /// [span][column][rows]: internal states where spans start.
-    pub span_starts: AVec<f64>,
+    pub span_starts: AVec<E>,
     /// [step][column][channel]: y, then d ln L / d u of the mean units.
     pub mean: AVec<f64>,
     /// [step][column][channel]: u of the variance units, then d ln L / d u of them.
     pub variance: AVec<f64>,
     /// [product - segment start + 1][column][delta_stride].
-    pub deltas: AVec<f64>,
+    pub deltas: AVec<E>,
     /// Of one segment: targets, terms of ln L, squared errors, precisions; [step][column][channel].
     pub targets: AVec<f64>,
     pub terms: AVec<f64>,
@@ -74,33 +75,27 @@ pub(crate) struct Trajectory {
     pub precisions: AVec<f64>,
 }
 
-impl Trajectory {
+impl<E: Element> Trajectory<E> {
     pub fn new() -> Self {
-        let empty = || AVec::new(64);
+        let (own, scores) = (|| AVec::new(64), || AVec::new(64));
         Self {
-            states: empty(),
-            internal: empty(),
-            drive: empty(),
-            span_starts: empty(),
-            mean: empty(),
-            variance: empty(),
-            deltas: empty(),
-            targets: empty(),
-            terms: empty(),
-            squares: empty(),
-            precisions: empty(),
+            states: own(),
+            internal: own(),
+            drive: own(),
+            span_starts: own(),
+            mean: scores(),
+            variance: scores(),
+            deltas: own(),
+            targets: scores(),
+            terms: scores(),
+            squares: scores(),
+            precisions: scores(),
         }
     }
 
     /// Makes room for a block.
-    pub fn fit(&mut self, packed: &Packed, block: &Block, cut: Cut) {
+    pub fn fit(&mut self, packed: &Packed<E>, block: &Block, cut: Cut) {
         let n = block.columns();
-        let grow = |list: &mut AVec<f64>, len: usize| {
-            if list.len() < len {
-                list.reserve_exact(len - list.len());
-                list.resize(len, 0.0);
-            }
-        };
         let channels = if packed.n_out > packed.n_y { packed.n_y } else { 0 };
         // One more row than is read, for products that read shifted rows.
         grow(&mut self.states, ((cut.span + 1) * n + 1) * packed.state_stride);
@@ -113,5 +108,13 @@ impl Trajectory {
         for scratch in [&mut self.targets, &mut self.terms, &mut self.squares, &mut self.precisions] {
             grow(scratch, cut.segment * n * packed.n_y);
         }
+    }
+}
+
+/// Makes a list at least so long.
+fn grow<T: Element>(list: &mut AVec<T>, len: usize) {
+    if list.len() < len {
+        list.reserve_exact(len - list.len());
+        list.resize(len, T::ZERO);
     }
 }

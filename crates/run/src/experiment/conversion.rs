@@ -90,6 +90,7 @@ impl Experiment {
             it.closed_loop = training.closed_loop.clone();
             it.lbfgs = training.lbfgs.clone();
             it.recompute = training.recompute;
+            it.precision = training.precision;
             it.on_divergence = training.on_divergence;
         })
     }

@@ -23,6 +23,7 @@ pub use difference::{Difference, differences};
 pub use overrides::Override;
 pub use reading::{Base, read, read_text, table};
 pub use scrnn::learning::{Adam, AdaptiveRate, ClosedLoop, Lbfgs, Momentum, OnDivergence, PriorStep};
+pub use scrnn::objective::Precision;
 pub use scrnn::topology::Group;
 pub use scrnn_tasks::TaskName;
 
@@ -352,6 +353,10 @@ pub struct Training {
     /// learned stays the same to the bit.
     #[serde(default)]
     pub recompute: bool,
+    /// The numbers that states and products are computed in: "f32" is faster, and comes to other bits than "f64". The likelihood and
+    /// sums over sequences are float64 in any case, and so are closed loops and sequences with missing values.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub precision: Precision,
     /// What to do when training becomes unstable: a value is not finite, or the likelihood collapses.
     #[serde(default = "recover")]
     pub on_divergence: OnDivergence,

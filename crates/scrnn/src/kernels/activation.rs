@@ -17,6 +17,8 @@ use pulp::Simd;
 
 use super::ROWS;
 
+pub mod single;
+
 /// 1.5 * 2^52: added and taken off again, it rounds to the nearest integer.
 const ROUND: f64 = 6_755_399_441_055_744.0;
 /// 1.5 * 2^20 plus the exponent's bias: puts an integer where a shift by 20 bits of the upper half makes it an exponent.

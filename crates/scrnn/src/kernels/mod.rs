@@ -5,9 +5,12 @@
 //! element is summed in one fixed order of fused multiply-adds: all instruction sets give the same bits.
 
 pub mod activation;
+pub mod element;
 pub mod outer;
 pub mod panels;
 pub mod reference;
+
+use element::{Element, lanes};
 
 /// Rows are padded to a multiple of this: the widest vector, eight f64.
 pub const ROWS: usize = 8;
@@ -28,7 +31,7 @@ pub const fn stride(count: usize) -> usize {
 
 /// Copies a few values; a call of memcpy would cost more than the values.
 #[inline(always)]
-pub fn copy_few(to: &mut [f64], from: &[f64]) {
+pub fn copy_few<T: Copy>(to: &mut [T], from: &[T]) {
     match (to, from) {
         ([a], [x]) => *a = *x,
         ([a, b], [x, y]) => (*a, *b) = (*x, *y),
@@ -58,9 +61,9 @@ const fn tallest<S: pulp::Simd>() -> usize {
 
 /// Whether a tile of so many vectors and columns is ever asked for, with `chains` interleaved sums: all others need not
 /// be compiled.
-const fn is_used<S: pulp::Simd>(vectors: usize, columns: usize, chains: usize) -> bool {
+const fn is_used<S: pulp::Simd, E: Element>(vectors: usize, columns: usize, chains: usize) -> bool {
     // Rows come in whole groups of ROWS: narrow vectors always fill a tile.
-    let group = ROWS / S::F64_LANES;
+    let group = E::ROWS / lanes::<S, E>();
     let least = if group < tallest::<S>() { group } else { tallest::<S>() };
     vectors <= tallest::<S>()
         && vectors.is_multiple_of(least)

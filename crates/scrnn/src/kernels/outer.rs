@@ -10,13 +10,14 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::{ROWS, accumulators, is_used, tallest};
+use super::element::{Element, lanes};
+use super::{accumulators, is_used, tallest};
 
 /// Rows of values at equal distance. There must be one row more than is read, or as much memory behind the last.
 #[derive(Debug, Clone, Copy)]
-pub struct Rows<'a> {
+pub struct Rows<'a, E = f64> {
     /// All rows.
-    pub values: &'a [f64],
+    pub values: &'a [E],
     /// Distance between rows.
     pub stride: usize,
 }
@@ -39,30 +40,30 @@ impl From<usize> for Taken {
     }
 }
 
-/// Accumulates the outer products of the rows `taken`, in their order. `gradient` holds one row of `rows` values (a multiple of [`ROWS`]) for each k in
+/// Accumulates the outer products of the rows `taken`, in their order. `gradient` holds one row of `rows` values (a multiple of [`Element::ROWS`]) for each k in
 /// `from..to`, in that order.
 #[inline(always)]
-pub fn accumulate<S: Simd>(
+pub fn accumulate<S: Simd, E: Element>(
     simd: S,
-    delta: Rows<'_>,
-    state: Rows<'_>,
+    delta: Rows<'_, E>,
+    state: Rows<'_, E>,
     taken: impl Into<Taken>,
     rows: usize,
     (from, to): (usize, usize),
-    gradient: &mut [f64],
+    gradient: &mut [E],
 ) {
-    debug_assert!(rows.is_multiple_of(ROWS) && gradient.len() >= (to - from) * rows);
-    let (vectors, taken) = (rows / S::F64_LANES, taken.into());
+    debug_assert!(rows.is_multiple_of(E::ROWS) && gradient.len() >= (to - from) * rows);
+    let (vectors, taken) = (rows / lanes::<S, E>(), taken.into());
     let bands = vectors.div_ceil(tallest::<S>()).max(1);
     let mut first = 0;
     for band in 0..bands {
         let height = vectors / bands + usize::from(band < vectors % bands);
-        let job = Job { delta, state, taken, rows, row: first * S::F64_LANES, from, to };
+        let job = Job { delta, state, taken, rows, row: first * lanes::<S, E>(), from, to };
         match height {
-            4 => tiles::<S, 4>(simd, &job, gradient),
-            3 => tiles::<S, 3>(simd, &job, gradient),
-            2 => tiles::<S, 2>(simd, &job, gradient),
-            1 => tiles::<S, 1>(simd, &job, gradient),
+            4 => tiles::<S, E, 4>(simd, &job, gradient),
+            3 => tiles::<S, E, 3>(simd, &job, gradient),
+            2 => tiles::<S, E, 2>(simd, &job, gradient),
+            1 => tiles::<S, E, 1>(simd, &job, gradient),
             _ => {}
         }
         first += height;
@@ -70,9 +71,9 @@ pub fn accumulate<S: Simd>(
 }
 
 #[derive(Clone, Copy)]
-struct Job<'a> {
-    delta: Rows<'a>,
-    state: Rows<'a>,
+struct Job<'a, E> {
+    delta: Rows<'a, E>,
+    state: Rows<'a, E>,
     taken: Taken,
     rows: usize,
     row: usize,
@@ -81,7 +82,7 @@ struct Job<'a> {
 }
 
 #[inline(always)]
-fn tiles<S: Simd, const M: usize>(simd: S, job: &Job<'_>, gradient: &mut [f64]) {
+fn tiles<S: Simd, E: Element, const M: usize>(simd: S, job: &Job<'_, E>, gradient: &mut [E]) {
     let widest = (accumulators::<S>() / M).clamp(1, 6);
     let columns = job.to - job.from;
     let tiles = columns.div_ceil(widest);
@@ -89,12 +90,12 @@ fn tiles<S: Simd, const M: usize>(simd: S, job: &Job<'_>, gradient: &mut [f64]) 
     for tile in 0..tiles {
         let width = columns / tiles + usize::from(tile < columns % tiles);
         match width {
-            6 => enter::<S, M, 6>(simd, job, first, gradient),
-            5 => enter::<S, M, 5>(simd, job, first, gradient),
-            4 => enter::<S, M, 4>(simd, job, first, gradient),
-            3 => enter::<S, M, 3>(simd, job, first, gradient),
-            2 => enter::<S, M, 2>(simd, job, first, gradient),
-            1 => enter::<S, M, 1>(simd, job, first, gradient),
+            6 => enter::<S, E, M, 6>(simd, job, first, gradient),
+            5 => enter::<S, E, M, 5>(simd, job, first, gradient),
+            4 => enter::<S, E, M, 4>(simd, job, first, gradient),
+            3 => enter::<S, E, M, 3>(simd, job, first, gradient),
+            2 => enter::<S, E, M, 2>(simd, job, first, gradient),
+            1 => enter::<S, E, M, 1>(simd, job, first, gradient),
             _ => {}
         }
         first += width;
@@ -103,29 +104,34 @@ fn tiles<S: Simd, const M: usize>(simd: S, job: &Job<'_>, gradient: &mut [f64]) 
 
 /// A function of its own, see [`super::panels`].
 #[inline(never)]
-fn enter<S: Simd, const M: usize, const N: usize>(simd: S, job: &Job<'_>, first: usize, gradient: &mut [f64]) {
-    if is_used::<S>(M, N, 1) {
-        simd.vectorize(Tile::<M, N> { job, first, gradient });
+fn enter<S: Simd, E: Element, const M: usize, const N: usize>(
+    simd: S,
+    job: &Job<'_, E>,
+    first: usize,
+    gradient: &mut [E],
+) {
+    if is_used::<S, E>(M, N, 1) {
+        simd.vectorize(Tile::<E, M, N> { job, first, gradient });
     }
 }
 
 /// M vectors of rows by N values of k.
-struct Tile<'a, const M: usize, const N: usize> {
-    job: &'a Job<'a>,
+struct Tile<'a, E, const M: usize, const N: usize> {
+    job: &'a Job<'a, E>,
     first: usize,
-    gradient: &'a mut [f64],
+    gradient: &'a mut [E],
 }
 
-impl<const M: usize, const N: usize> WithSimd for Tile<'_, M, N> {
+impl<E: Element, const M: usize, const N: usize> WithSimd for Tile<'_, E, M, N> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { job, first, gradient } = self;
-        let lanes = S::F64_LANES;
-        let mut sums = [[simd.splat_f64s(0.0); N]; M];
+        let lanes = lanes::<S, E>();
+        let mut sums = [[E::splat(simd, E::ZERO); N]; M];
         for n in 0..N {
-            let (out, _) = S::as_simd_f64s(&gradient[(first + n) * job.rows + job.row..][..M * lanes]);
+            let out = E::vectors::<S>(&gradient[(first + n) * job.rows + job.row..][..M * lanes]);
             for m in 0..M {
                 sums[m][n] = out[m];
             }
@@ -137,18 +143,18 @@ impl<const M: usize, const N: usize> WithSimd for Tile<'_, M, N> {
             let deltas = &job.delta.values[first * job.delta.stride + job.row..][..width * job.delta.stride];
             let states = &job.state.values[first * job.state.stride + k..][..width * job.state.stride];
             for (delta, state) in deltas.chunks_exact(job.delta.stride).zip(states.chunks_exact(job.state.stride)) {
-                let (delta, _) = S::as_simd_f64s(&delta[..height]);
+                let delta = E::vectors::<S>(&delta[..height]);
                 let state = &state[..N];
                 for n in 0..N {
-                    let x = simd.splat_f64s(state[n]);
+                    let x = E::splat(simd, state[n]);
                     for m in 0..M {
-                        sums[m][n] = simd.mul_add_f64s(delta[m], x, sums[m][n]);
+                        sums[m][n] = E::mul_add(simd, delta[m], x, sums[m][n]);
                     }
                 }
             }
         }
         for n in 0..N {
-            let (out, _) = S::as_mut_simd_f64s(&mut gradient[(first + n) * job.rows + job.row..][..M * lanes]);
+            let out = E::vectors_mut::<S>(&mut gradient[(first + n) * job.rows + job.row..][..M * lanes]);
             for m in 0..M {
                 out[m] = sums[m][n];
             }

@@ -190,6 +190,7 @@ impl Learner {
         };
         let mut request = Request::new(topology, data);
         request.recompute = plan.recompute;
+        request.precision = plan.precision;
         request.closed_loop = plan.closed_loop.as_ref().map(|it| ClosedLoopTerm::new(it.copies, it.weight));
         let objective = backend.objective(&request)?;
         let mut batches = Batches::new(objective, topology, data, batch_size);

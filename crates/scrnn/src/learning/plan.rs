@@ -1,6 +1,7 @@
 //! What to do: epochs, the prior's variance, and an optimiser with its options.
 
 use crate::error::{Error, Result};
+use crate::objective::Precision;
 
 /// A training.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,6 +22,8 @@ pub struct Plan {
     /// Keep only a part of the states and compute the rest again on the way back: memory grows with the square root of
     /// the sequences' length, time by a third, and the bits stay the same.
     pub recompute: bool,
+    /// What states and products are computed in; the bits of a training are those of its precision.
+    pub precision: Precision,
     /// What to do when the training becomes unstable.
     pub on_divergence: OnDivergence,
 }
@@ -46,6 +49,7 @@ impl Default for Plan {
             closed_loop: None,
             lbfgs: None,
             recompute: false,
+            precision: Precision::F64,
             on_divergence: OnDivergence::Stop,
         }
     }

@@ -1,11 +1,14 @@
 //! Every block of the gradient against central differences of the plain reference.
 
 use super::*;
+use crate::batch::Block;
 use crate::initial_states::InitialStates;
 use crate::initialization::initialize;
 use crate::likelihood;
 use crate::network::Network;
+use crate::packed::Packed;
 use crate::topology::{Group, Prediction, Topology};
+use crate::trajectory::Cut;
 
 const FLOORLESS: Prediction = Prediction::MeanAndVariance { floor: 0.0 };
 
@@ -22,6 +25,7 @@ struct Case {
     /// Variance of the initial states' prior.
     prior: f64,
     recompute: bool,
+    precision: Precision,
 }
 
 const SMALL: Case = Case {
@@ -32,6 +36,7 @@ const SMALL: Case = Case {
     lengths: &[9, 9, 9],
     prior: 1.0,
     recompute: false,
+    precision: Precision::F64,
 };
 
 /// Everything that a gradient is taken of.
@@ -100,7 +105,8 @@ fn difference(mut f: impl FnMut(f64) -> f64, h: f64) -> f64 {
 /// What an objective finds that was in use before.
 fn evaluation(case: &Case, engine: &Engine) -> Evaluation {
     let (point, (data, runs)) = (case.point(), case.data());
-    let request = Request { recompute: case.recompute, ..Request::new(&point.network.topology, &data) };
+    let (recompute, precision) = (case.recompute, case.precision);
+    let request = Request { recompute, precision, ..Request::new(&point.network.topology, &data) };
     let mut objective = engine.objective(&request).unwrap();
     let mut evaluation = Evaluation::new(&point.network.topology);
     objective.set_parameters(&point.network.parameters);
@@ -110,10 +116,29 @@ fn evaluation(case: &Case, engine: &Engine) -> Evaluation {
     evaluation
 }
 
+/// float32 comes to the same, but for rounding: to 1e-4 of the largest gradient of a block.
+fn check_single(case: &Case, double: &Evaluation) {
+    let single = evaluation(&Case { precision: Precision::F32, ..case.clone() }, &Engine::serial());
+    assert!(single.gradients != double.gradients, "float32 has bits of its own");
+    let near = |single: &[f64], double: &[f64], what: &str| {
+        let scale = double.iter().fold(1e-3, |most: f64, value| most.max(value.abs()));
+        for (i, (single, double)) in single.iter().zip(double).enumerate() {
+            assert!((single - double).abs() <= 1e-4 * scale, "{what}[{i}]: {single} in float32, {double} in float64");
+        }
+    };
+    for block in Parameter::ALL {
+        near(single.gradients.block(block), double.gradients.block(block), block.name());
+    }
+    near(&single.initial, &double.initial, "initial state");
+    near(&single.ln_likelihood, &double.ln_likelihood, "ln L");
+    near(&single.squared_error, &double.squared_error, "squared error");
+}
+
 fn check(case: &Case) {
     let (point, samples) = (case.point(), case.samples());
     let topology = &point.network.topology;
     let objective = evaluation(case, &Engine::serial());
+    check_single(case, &objective);
 
     for (s, (x, &steps)) in samples.iter().zip(case.lengths).enumerate() {
         let (plain, squared) = likelihood::plain(&point.network, point.states.sequence(s), x, steps).unwrap();
@@ -289,13 +314,37 @@ fn any_number_of_threads_gives_the_same_bits() {
 #[test]
 fn recomputation_of_spans_gives_the_same_bits() {
     let engine = Engine::serial();
-    assert!(evaluate(&LONG, &engine) == evaluate(&Case { recompute: true, ..LONG }, &engine));
+    for precision in [Precision::F64, Precision::F32] {
+        let kept = Case { precision, ..LONG };
+        assert!(evaluate(&kept, &engine) == evaluate(&Case { recompute: true, ..kept }, &engine));
+    }
+}
+
+#[test]
+fn float32_gives_the_same_bits_on_any_threads_and_instruction_set() {
+    let case = Case { precision: Precision::F32, lengths: &[70, 150, 70, 30, 64, 70, 1], ..LONG };
+    let portable = evaluate(&case, &Engine::new(1, crate::engine::InstructionSet::Portable).unwrap());
+    assert!(portable.0.iter().all(|g| f64::from_bits(*g).is_finite()));
+    for set in crate::engine::InstructionSet::available() {
+        for threads in [1, 3] {
+            assert!(evaluate(&case, &Engine::new(threads, set).unwrap()) == portable, "{set}, {threads} threads");
+        }
+    }
+}
+
+#[test]
+fn an_objective_says_what_it_computes_in() {
+    let (point, (data, _)) = (SMALL.point(), SMALL.data());
+    for (precision, name) in [(Precision::F64, "f64"), (Precision::F32, "f32")] {
+        let request = Request { precision, ..Request::new(&point.network.topology, &data) };
+        assert_eq!(Engine::serial().objective(&request).unwrap().numerics(), name);
+    }
 }
 
 #[test]
 fn recomputation_keeps_a_small_part_of_the_states() {
     let topology = LONG.point().network.topology;
-    let packed = Packed::new(&topology, crate::engine::InstructionSet::best());
+    let packed = Packed::<f64>::new(&topology, crate::engine::InstructionSet::best());
     let mut block = Block::default();
     block.fill(&[Run::new(0, 20_000)], &[0]);
     let cut = Cut::new(&packed, &block, true);
