@@ -156,7 +156,7 @@ struct Fixture {
 impl Fixture {
     fn new(rows: usize, inner: &[usize], columns: usize, set: InstructionSet) -> Self {
         let matrix = |&inner: &usize| {
-            let mut panels = Panels::zeros(rows, inner, chains_for(rows), set);
+            let mut panels = Panels::zeros(rows, inner, chains_for::<f64>(rows), set);
             panels.fill(rows, |row, k| ((row * 7 + k * 3) as f64).sin() / inner as f64);
             panels
         };

@@ -7,6 +7,7 @@ use scrnn::dataset::{Dataset, Sequence};
 use scrnn::engine::{Engine, InstructionSet};
 use scrnn::initialization::initialize;
 use scrnn::learning::{Adam, EpochReport, Learner, Optimiser, Plan};
+use scrnn::objective::Precision;
 use scrnn::topology::Topology;
 
 /// Smooth sequences that give `steps` steps of prediction each, between -0.8 and 0.8, no two alike.
@@ -31,9 +32,22 @@ pub struct Training {
 impl Training {
     /// A new network on `data`, with Adam on a schedule so long that its rate stays near 0: all epochs cost the same.
     pub fn new(topology: &Topology, data: &Dataset, threads: usize, set: InstructionSet) -> Self {
+        Self::with(topology, data, threads, set, Precision::F64)
+    }
+
+    /// The same in a precision.
+    #[allow(dead_code, reason = "not every bench that has this module asks for one")]
+    pub fn with(
+        topology: &Topology,
+        data: &Dataset,
+        threads: usize,
+        set: InstructionSet,
+        precision: Precision,
+    ) -> Self {
         let (network, states) = initialize(topology, data.sequences().len(), 1);
         let plan = Plan::with(|it| {
             it.epochs = 1 << 50;
+            it.precision = precision;
             it.optimiser = Optimiser::Adam(Adam::default());
         });
         let engine = Engine::new(threads, set).expect("an instruction set that this processor has");

@@ -100,6 +100,29 @@ fn a_longer_momentum_run_goes_on_from_a_shorter_one() {
 }
 
 #[test]
+fn a_training_in_float32_goes_on_in_float32_and_says_so() {
+    let place = Place::with(SINE);
+    let single = "--epochs 150 --set training.precision=f32";
+    let found =
+        place.json(&format!("train sine.toml --out whole {single} --threads 1 --instruction-set portable --json"));
+    place.ok("train sine.toml --out parts --epochs 91 --set training.precision=f32 --threads 2");
+    place.ok("train parts --resume --epochs 150");
+    same_results(&place, "whole", "parts");
+    let double = place.json("train sine.toml --out double --epochs 150 --json");
+    let nll = |found: &serde_json::Value| found["nll"].as_f64().unwrap();
+    assert!(nll(&found) != nll(&double) && (nll(&found) - nll(&double)).abs() < 1e-3, "{found} {double}");
+    let noted = |run: &str| {
+        String::from_utf8_lossy(&place.read(&format!("{run}/checkpoint.safetensors")))
+            .contains(r#"\"numerics\":\"f32\""#)
+    };
+    assert!(noted("parts") && !noted("double"));
+    let (_, told) = place.fails(5, "train parts --resume --epochs 160 --set training.precision=f64");
+    assert!(told.contains("training.precision"), "{told}");
+    let (_, told) = place.fails(2, "train sine.toml --out other --set training.precision=f16");
+    assert!(told.contains("f16") && told.contains("f32"), "{told}");
+}
+
+#[test]
 fn resuming_a_finished_run_changes_nothing() {
     let place = Place::with(&sine_with_adam());
     let first = place.json("train sine.toml --out run --json");
