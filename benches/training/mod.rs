@@ -30,13 +30,13 @@ pub struct Training {
 }
 
 impl Training {
-    /// A new network on `data`, with Adam on a schedule so long that its rate stays near 0: all epochs cost the same.
+    /// A new network on `data`, in float64, with Adam on a schedule so long that its rate stays near 0: all epochs cost the same.
+    #[allow(dead_code, reason = "one bench compares precisions and names both")]
     pub fn new(topology: &Topology, data: &Dataset, threads: usize, set: InstructionSet) -> Self {
         Self::with(topology, data, threads, set, Precision::F64)
     }
 
     /// The same in a precision.
-    #[allow(dead_code, reason = "not every bench that has this module asks for one")]
     pub fn with(
         topology: &Topology,
         data: &Dataset,
