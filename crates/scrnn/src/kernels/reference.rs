@@ -29,7 +29,7 @@ pub fn accumulate(delta: &[f64], rows: usize, state: &[f64], inner: usize) -> Ve
 #[cfg(test)]
 mod tests {
     use super::super::outer::{self, Rows, Taken};
-    use super::super::panels::{self, Columns, Panels, Product};
+    use super::super::panels::{self, Columns, Panels, Product, Way};
     use super::super::{padded, stride};
     use crate::engine::{InstructionSet, Run};
     use proptest::prelude::*;
@@ -40,6 +40,7 @@ mod tests {
         source: Columns<'a>,
         columns: usize,
         start: &'a [f64],
+        way: Way<'a>,
         out: &'a mut [f64],
     }
 
@@ -50,7 +51,7 @@ mod tests {
         fn with_simd<S: Simd>(self, simd: S) {
             let (matrices, sources) = ([self.matrix], [self.source]);
             let product = Product { matrices, sources, columns: self.columns, start: self.start, ahead: &[] };
-            panels::multiply(simd, product, self.out);
+            panels::multiply_into(simd, product, self.way, self.out);
         }
     }
 
@@ -90,8 +91,14 @@ mod tests {
         padded_start.resize(padded(rows), 0.0);
         let mut out = vec![f64::NAN; columns * padded(rows)];
         let source_columns = Columns { values: &source, stride: inner };
-        let work = Multiply { matrix: &packed, source: source_columns, columns, start: &padded_start, out: &mut out };
-        set.run(work);
+        let run = |way: Way<'_>, out: &mut [f64]| {
+            set.run(Multiply { matrix: &packed, source: source_columns, columns, start: &padded_start, way, out });
+        };
+        run(Way::default(), &mut out);
+        // Walked the other way, and with a half of what is there, which is then added.
+        let mut again = out.clone();
+        run(Way { backwards: true, keep: Some(&vec![0.5; padded(rows)]) }, &mut again);
+        assert!(out.iter().zip(&again).all(|(once, more)| *more == 0.5_f64.mul_add(*once, *once)));
         let fast = out.chunks_exact(padded(rows)).flat_map(|column| column[..rows].to_vec()).collect();
         (fast, super::multiply(&matrix, &source, inner, &start))
     }
@@ -158,7 +165,9 @@ mod tests {
 
     #[test]
     fn a_sum_does_not_depend_on_columns_or_instruction_set() {
-        for (rows, inner) in [(12, 13), (36, 34), (64, 62), (200, 77)] {
+        // One column is summed in tiles that span panels: all numbers of panels, high and low.
+        let spanned = (1..=20).map(|groups| (8 * groups - 3, 9));
+        for (rows, inner) in [(12, 13), (36, 34), (64, 62), (200, 77)].into_iter().chain(spanned) {
             let chains = panels::chains_for(rows);
             let (many, _) = multiply_fast(InstructionSet::Portable, rows, inner, 13, chains);
             for set in InstructionSet::available() {
