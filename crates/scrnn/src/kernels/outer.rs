@@ -4,7 +4,8 @@
 //! gradient[k, row] += sum_n delta[n, row] * state[n, k]
 //! ```
 //!
-//! n runs over (step, column) in memory order; of columns that have ended, rows are left out. Tiles of a few vectors of rows and six k stay in registers while n runs.
+//! n runs over (step, column) in memory order; of columns that have ended, rows are left out. Tiles of a few vectors of rows
+//! and six k stay in registers while n runs. Of many k, a block at a time: all bands of rows take it up before the next one.
 
 #![allow(clippy::needless_range_loop, reason = "loops over the constant sides of a tile unroll; indices say which")]
 
@@ -20,6 +21,12 @@ pub struct Rows<'a> {
     /// Distance between rows.
     pub stride: usize,
 }
+
+/// From so many k on, tall tiles take them in blocks: from one band of rows to the next, the states and the gradient of all
+/// of them would leave the second-level cache and its table of pages.
+const MANY: usize = 768;
+/// Values of k in a block.
+const BLOCK: usize = 96;
 
 /// Which rows are taken up: the first `width` of every `period`, `groups` times.
 #[derive(Debug, Clone, Copy)]
@@ -52,12 +59,23 @@ pub fn accumulate<S: Simd>(
     gradient: &mut [f64],
 ) {
     debug_assert!(rows.is_multiple_of(ROWS) && gradient.len() >= (to - from) * rows);
-    let (vectors, taken) = (rows / S::F64_LANES, taken.into());
+    let taken = taken.into();
+    let is_tall = tallest::<S>() * S::F64_LANES > ROWS;
+    let block = if is_tall && to - from >= MANY { BLOCK } else { to - from };
+    for first in (from..to).step_by(block.max(1)) {
+        let job = Job { delta, state, taken, rows, row: 0, from: first, to: to.min(first + block) };
+        bands(simd, job, &mut gradient[(first - from) * rows..]);
+    }
+}
+
+#[inline(always)]
+fn bands<S: Simd>(simd: S, job: Job<'_>, gradient: &mut [f64]) {
+    let vectors = job.rows / S::F64_LANES;
     let bands = vectors.div_ceil(tallest::<S>()).max(1);
     let mut first = 0;
     for band in 0..bands {
         let height = vectors / bands + usize::from(band < vectors % bands);
-        let job = Job { delta, state, taken, rows, row: first * S::F64_LANES, from, to };
+        let job = Job { row: first * S::F64_LANES, ..job };
         match height {
             4 => tiles::<S, 4>(simd, &job, gradient),
             3 => tiles::<S, 3>(simd, &job, gradient),
