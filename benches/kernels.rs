@@ -6,44 +6,22 @@
 
 mod arguments;
 mod cache;
+mod fixtures;
 mod machine;
 
 use std::hint::black_box;
 use std::time::Duration;
 
-use aligned_vec::AVec;
 use arguments::Arguments;
 use cache::read_gbytes;
+use fixtures::{Elements, Kernel, Repeat, Size, values};
 use machine::{median, on, peak_gflops, seconds_per_call};
 use nalgebra::DMatrix;
-use pulp::{Simd, WithSimd};
 use scrnn::engine::InstructionSet;
-use scrnn::kernels::activation::{exp_slice, tanh_rows};
-use scrnn::kernels::outer::{Rows, accumulate};
-use scrnn::kernels::panels::{Columns, Panels, Product, chains_for, multiply};
-use scrnn::kernels::{padded, stride};
+use scrnn::kernels::padded;
 
 /// What one measurement takes.
 const BURST: Duration = Duration::from_millis(4);
-
-/// Sizes of a network and the columns of a block.
-#[derive(Clone, Copy)]
-struct Size {
-    units: usize,
-    channels: usize,
-    columns: usize,
-}
-
-impl Size {
-    const fn new(units: usize, channels: usize, columns: usize) -> Self {
-        Self { units, channels, columns }
-    }
-
-    /// Mean and variance units.
-    fn outputs(self) -> usize {
-        2 * self.channels
-    }
-}
 
 const SIZES: [Size; 8] = [
     Size::new(60, 2, 6),
@@ -65,10 +43,10 @@ fn main() {
     for size in SIZES {
         let Size { units, channels, columns } = size;
         let name = |kernel: &str| format!("{kernel} {units} units x {columns}");
-        let (all, inputs) = (units + size.outputs(), units + channels);
-        let forward = Fixture::new(all, &[channels, units], columns, set);
+        let (all, inputs) = (size.all(), units + channels);
+        let forward = size.forward(set);
         row(&name("forward"), rounds, set, all * inputs * columns, &forward, &Naive::new(all, inputs, columns));
-        let backward = Fixture::new(units, &[all], columns, set);
+        let backward = size.backward(set);
         row(&name("backward"), rounds, set, units * all * columns, &backward, &Naive::new(units, all, columns));
         if columns == 1 {
             let bytes = 8 * padded(all) * inputs;
@@ -78,40 +56,14 @@ fn main() {
     }
     for (units, channels) in [(10, 1), (40, 8), (60, 2), (256, 2), (1024, 2)] {
         let size = Size::new(units, channels, 1);
-        // As many rows as a segment has in training.
-        let (all, inputs) = (units + size.outputs(), units + channels + 1);
-        let count = ((448 << 10) / (8 * (stride(all) + stride(padded(all) + inputs)))).max(64);
+        let (all, outer) = (size.all(), size.gradient());
+        let (inputs, count) = (outer.inner, outer.count);
         let name = format!("gradient {units} units, {count} rows");
-        let outer = Outer::new(all, inputs, count);
         row(&name, rounds, set, all * inputs * count, &outer, &Naive::new(all, count, inputs));
     }
     println!();
     elements("tanh", set, rounds, true, f64::tanh);
     elements("exp", set, rounds, false, f64::exp);
-}
-
-/// A kernel with its data, ready to run.
-trait Kernel {
-    fn run<S: Simd>(&self, simd: S, out: &mut [f64]);
-    /// Length of `out`.
-    fn len(&self) -> usize;
-}
-
-struct Repeat<'a, K> {
-    kernel: &'a K,
-    out: &'a mut [f64],
-    calls: u32,
-}
-
-impl<K: Kernel> WithSimd for Repeat<'_, K> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        for _ in 0..self.calls {
-            self.kernel.run(simd, black_box(&mut *self.out));
-        }
-    }
 }
 
 /// Prints one line: `terms` multiply-adds by the kernel and by nalgebra, alternating with the peak.
@@ -136,99 +88,6 @@ fn row(name: &str, rounds: usize, set: InstructionSet, terms: usize, kernel: &im
         operations / naive / 1e9,
         naive / seconds
     );
-}
-
-/// Values between -1 and 1 that do not repeat, aligned as in training.
-fn values(count: usize) -> AVec<f64> {
-    AVec::from_iter(64, (0..count).map(|k| (k as f64 * 0.618_033_988_75).fract() * 2.0 - 1.0))
-}
-
-/// A product with one or two matrices, laid out as in training.
-struct Fixture {
-    matrices: Vec<Panels>,
-    columns: usize,
-    rows: usize,
-    state: AVec<f64>,
-    state_stride: usize,
-    start: AVec<f64>,
-}
-
-impl Fixture {
-    fn new(rows: usize, inner: &[usize], columns: usize, set: InstructionSet) -> Self {
-        let matrix = |&inner: &usize| {
-            let mut panels = Panels::zeros(rows, inner, chains_for::<f64>(rows), set);
-            panels.fill(rows, |row, k| ((row * 7 + k * 3) as f64).sin() / inner as f64);
-            panels
-        };
-        let state_stride = stride(padded(rows) + inner.iter().sum::<usize>());
-        Self {
-            matrices: inner.iter().map(matrix).collect(),
-            columns,
-            rows: padded(rows),
-            state: values(columns * state_stride + state_stride),
-            state_stride,
-            start: values(padded(rows)),
-        }
-    }
-
-    fn product<'a, const P: usize>(&'a self, matrices: [&'a Panels; P]) -> Product<'a, P> {
-        let source = Columns { values: &self.state, stride: self.state_stride };
-        Product { matrices, sources: [source; P], columns: self.columns, start: &self.start, ahead: &[] }
-    }
-}
-
-impl Kernel for Fixture {
-    #[inline(always)]
-    fn run<S: Simd>(&self, simd: S, out: &mut [f64]) {
-        match self.matrices.as_slice() {
-            [first, second] => multiply(simd, self.product([first, second]), out),
-            [only] => multiply(simd, self.product([only]), out),
-            _ => {}
-        }
-    }
-
-    fn len(&self) -> usize {
-        self.columns * self.rows
-    }
-}
-
-/// The weight gradient of a segment.
-struct Outer {
-    rows: usize,
-    inner: usize,
-    count: usize,
-    delta: AVec<f64>,
-    delta_stride: usize,
-    state: AVec<f64>,
-    state_stride: usize,
-}
-
-impl Outer {
-    fn new(rows: usize, inner: usize, count: usize) -> Self {
-        let (delta_stride, state_stride) = (stride(padded(rows)), stride(inner));
-        Self {
-            rows: padded(rows),
-            inner,
-            count,
-            delta: values((count + 1) * delta_stride),
-            delta_stride,
-            state: values((count + 1) * state_stride),
-            state_stride,
-        }
-    }
-}
-
-impl Kernel for Outer {
-    #[inline(always)]
-    fn run<S: Simd>(&self, simd: S, out: &mut [f64]) {
-        let delta = Rows { values: &self.delta, stride: self.delta_stride };
-        let state = Rows { values: &self.state, stride: self.state_stride };
-        accumulate(simd, delta, state, self.count, self.rows, (0, self.inner), out);
-    }
-
-    fn len(&self) -> usize {
-        self.rows * self.inner
-    }
 }
 
 /// A product of the same size by nalgebra, into memory that is there.
@@ -272,25 +131,4 @@ fn elements(name: &str, set: InstructionSet, rounds: usize, hyperbolic: bool, st
     let per_element = |times| 1e9 * median(times) / source.len() as f64;
     let (fast, plain) = (per_element(fast), per_element(plain));
     println!("{name:6} {fast:5.2} ns an element; std {plain:5.2} ns, {:.1}x", plain / fast);
-}
-
-struct Elements<'a> {
-    source: &'a [f64],
-    hyperbolic: bool,
-}
-
-impl Kernel for Elements<'_> {
-    #[inline(always)]
-    fn run<S: Simd>(&self, simd: S, out: &mut [f64]) {
-        if self.hyperbolic {
-            tanh_rows(simd, self.source, out);
-        } else {
-            out.copy_from_slice(self.source);
-            exp_slice(simd, 1.0, out);
-        }
-    }
-
-    fn len(&self) -> usize {
-        self.source.len()
-    }
 }

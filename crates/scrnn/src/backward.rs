@@ -16,7 +16,7 @@ use pulp::Simd;
 use crate::batch::Block;
 use crate::kernels::element::Element;
 use crate::kernels::outer::{Rows, Taken, accumulate};
-use crate::kernels::panels::{Columns, Product, multiply};
+use crate::kernels::panels::{Columns, Product, Way, multiply_into};
 use crate::packed::Packed;
 use crate::trajectory::Trajectory;
 
@@ -88,7 +88,7 @@ pub(crate) fn run<S: Simd, E: Element>(
         // The states of the step before: they were written long ago, and left the cache since.
         let ahead = &trajectory.states[at - (n * state_stride).min(at)..at];
         let product = Product { matrices, sources, columns: active, start: &packed.zeros, ahead };
-        multiply(simd, product, &mut trajectory.drive);
+        multiply_into(simd, product, Way { backwards: k % 2 == 1, keep: None }, &mut trajectory.drive);
         retreat(simd, packed, &trajectory.drive, states, after, before, active);
     }
 }

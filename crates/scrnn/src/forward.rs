@@ -20,7 +20,7 @@ use crate::dataset::Sequence;
 use crate::error::{Error, Result};
 use crate::features::{Features, Past};
 use crate::kernels::element::Element;
-use crate::kernels::panels::{Columns, Product, multiply};
+use crate::kernels::panels::{Columns, Product, Way, multiply_into};
 use crate::network::Network;
 use crate::packed::Packed;
 use crate::parameters::Block as Parameter;
@@ -215,12 +215,11 @@ pub(crate) fn run<S: Simd, E: Element>(
         let sources = [Columns { values: &now[rows..], stride }, Columns { values: now, stride }];
         let internal = &mut trajectory.internal[..n * rows];
         let matrices = [&packed.from_input, &packed.from_context];
-        multiply(
-            simd,
-            Product { matrices, sources, columns: active, start: &packed.bias, ahead: &[] },
-            &mut trajectory.drive,
-        );
-        advance(simd, packed, &trajectory.drive, internal, next, active);
+        let product = Product { matrices, sources, columns: active, start: &packed.bias, ahead: &[] };
+        // u <- (1 - 1/tau) u + drive, at the end of each sum.
+        let way = Way { backwards: k % 2 == 1, keep: Some(&packed.decay) };
+        multiply_into(simd, product, way, internal);
+        activate(simd, packed, internal, next, active);
         if record && k > 0 {
             let out = (k - 1) * n * n_y;
             for column in 0..active {

@@ -6,10 +6,10 @@
 use aligned_vec::AVec;
 use pulp::Simd;
 
-use crate::forward::{activate, advance};
+use crate::forward::activate;
 use crate::kernels::activation::{exp, tanh_rows};
 use crate::kernels::padded;
-use crate::kernels::panels::{Columns, Product, multiply};
+use crate::kernels::panels::{Columns, Product, Way, multiply, multiply_into};
 use crate::packed::Packed;
 
 /// Copies of one network at one moment.
@@ -20,8 +20,6 @@ pub(crate) struct Stepper {
     states: AVec<f64>,
     /// [column][rows].
     internal: AVec<f64>,
-    /// [column][rows]: what the product of a step gives.
-    drive: AVec<f64>,
     /// [column][padded outputs]: u of the mean and variance units, and what becomes of them.
     outputs: AVec<f64>,
     mean: AVec<f64>,
@@ -36,7 +34,6 @@ impl Stepper {
             columns,
             states: zeros(columns * packed.state_stride),
             internal: zeros(columns * packed.rows),
-            drive: zeros(columns * packed.rows),
             outputs: zeros(outputs),
             mean: zeros(outputs),
             variance: zeros(outputs),
@@ -89,8 +86,9 @@ impl Stepper {
             start: &packed.bias,
             ahead: &[],
         };
-        multiply(simd, product, &mut self.drive);
-        advance(simd, packed, &self.drive, &mut self.internal, &mut self.states, columns);
+        let way = Way { keep: Some(&packed.decay), ..Way::default() };
+        multiply_into(simd, product, way, &mut self.internal);
+        activate(simd, packed, &self.internal, &mut self.states, columns);
 
         let matrices = [&packed.outputs_from_input, &packed.outputs];
         let product = Product {

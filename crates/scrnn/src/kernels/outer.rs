@@ -4,7 +4,8 @@
 //! gradient[k, row] += sum_n delta[n, row] * state[n, k]
 //! ```
 //!
-//! n runs over (step, column) in memory order; of columns that have ended, rows are left out. Tiles of a few vectors of rows and six k stay in registers while n runs.
+//! n runs over (step, column) in memory order; of columns that have ended, rows are left out. Tiles of a few vectors of rows
+//! and six k stay in registers while n runs. Of many k, a block at a time: all bands of rows take it up before the next one.
 
 #![allow(clippy::needless_range_loop, reason = "loops over the constant sides of a tile unroll; indices say which")]
 
@@ -21,6 +22,12 @@ pub struct Rows<'a, E = f64> {
     /// Distance between rows.
     pub stride: usize,
 }
+
+/// From so many k on, tall tiles take them in blocks: from one band of rows to the next, the states and the gradient of all
+/// of them would leave the second-level cache and its table of pages.
+const MANY: usize = 768;
+/// Values of k in a block.
+const BLOCK: usize = 96;
 
 /// Which rows are taken up: the first `width` of every `period`, `groups` times.
 #[derive(Debug, Clone, Copy)]
@@ -53,12 +60,23 @@ pub fn accumulate<S: Simd, E: Element>(
     gradient: &mut [E],
 ) {
     debug_assert!(rows.is_multiple_of(E::ROWS) && gradient.len() >= (to - from) * rows);
-    let (vectors, taken) = (rows / lanes::<S, E>(), taken.into());
+    let taken = taken.into();
+    let is_tall = tallest::<S>() * lanes::<S, E>() > E::ROWS;
+    let block = if is_tall && to - from >= MANY { BLOCK } else { to - from };
+    for first in (from..to).step_by(block.max(1)) {
+        let job = Job { delta, state, taken, rows, row: 0, from: first, to: to.min(first + block) };
+        bands(simd, job, &mut gradient[(first - from) * rows..]);
+    }
+}
+
+#[inline(always)]
+fn bands<S: Simd, E: Element>(simd: S, job: Job<'_, E>, gradient: &mut [E]) {
+    let vectors = job.rows / lanes::<S, E>();
     let bands = vectors.div_ceil(tallest::<S>()).max(1);
     let mut first = 0;
     for band in 0..bands {
         let height = vectors / bands + usize::from(band < vectors % bands);
-        let job = Job { delta, state, taken, rows, row: first * lanes::<S, E>(), from, to };
+        let job = Job { row: first * lanes::<S, E>(), ..job };
         match height {
             4 => tiles::<S, E, 4>(simd, &job, gradient),
             3 => tiles::<S, E, 3>(simd, &job, gradient),

@@ -5,9 +5,9 @@
 //! ```
 //!
 //! The matrix is cut into panels as tall as a tile of the instruction set; within a panel the values of one k lie side
-//! by side, so a product reads it front to back. A tile of a panel and a few columns keeps all of its sums in registers. Sums run over
-//! k in ascending order; few rows are summed in two interleaved chains, because a short sum would otherwise wait for its
-//! own latency. Neither depends on the number of columns.
+//! by side, so a product reads it front to back. A tile of a panel and a few columns keeps all of its sums in registers.
+//! One column leaves too few sums in flight to hide their latency: then a tile spans several panels, a band. Sums run over k in ascending order; few rows are summed in two interleaved chains, because a short sum would otherwise wait
+//! for its own latency. Neither depends on the number of columns.
 
 #![allow(clippy::needless_range_loop, reason = "loops over the constant sides of a tile unroll; indices say which")]
 
@@ -31,7 +31,24 @@ pub struct Panels<E = f64> {
     chains: usize,
     /// First row and height of each panel.
     panels: Vec<(usize, usize)>,
+    /// The panels that a tile of one column spans.
+    bands: Vec<Band>,
+    /// A band for each panel.
+    single: Vec<Band>,
     values: AVec<E>,
+}
+
+/// Panels that one tile spans.
+#[derive(Debug, Clone, Copy)]
+struct Band {
+    /// The first row.
+    row: usize,
+    /// Rows of the first panel.
+    height: usize,
+    /// How many panels are as high.
+    tall: usize,
+    /// How many follow that are a group shorter.
+    short: usize,
 }
 
 /// First row and height of the panels of a matrix of `rows` rows (a multiple of `group`), at most `tallest` high: as
@@ -44,6 +61,30 @@ fn panels(rows: usize, tallest: usize, group: usize) -> Vec<(usize, usize)> {
         let height = (groups / count + usize::from(p < groups % count)) * group;
         start += height;
         (start - height, height)
+    };
+    (0..count).map(next).collect()
+}
+
+/// How many panels a tile of one column spans at most: enough for 8 to 12 sums in flight.
+const fn span(set: InstructionSet, chains: usize) -> usize {
+    match (set, chains) {
+        (InstructionSet::Avx2, 1) => 4,
+        (InstructionSet::Avx512 | InstructionSet::Neon, 1) | (InstructionSet::Avx2, _) => 3,
+        (InstructionSet::Avx512, _) => 2,
+        (InstructionSet::Neon | InstructionSet::Portable, _) => 1,
+    }
+}
+
+/// As few bands of up to `span` panels as can be, as even as can be.
+fn bands(panels: &[(usize, usize)], span: usize) -> Vec<Band> {
+    let count = panels.len().div_ceil(span);
+    let mut rest = panels;
+    let next = |b: usize| {
+        let (own, later) = rest.split_at(panels.len() / count + usize::from(b < panels.len() % count));
+        rest = later;
+        let (row, height) = own[0];
+        let tall = own.iter().filter(|panel| panel.1 == height).count();
+        Band { row, height, tall, short: own.len() - tall }
     };
     (0..count).map(next).collect()
 }
@@ -64,7 +105,9 @@ impl<E: Element> Panels<E> {
             InstructionSet::Avx2 | InstructionSet::Neon | InstructionSet::Portable => E::ROWS,
         };
         let values = AVec::from_iter(64, std::iter::repeat_n(E::ZERO, rows * inner));
-        Self { rows, inner, chains, panels: panels(rows, tallest, E::ROWS), values }
+        let panels = panels(rows, tallest, E::ROWS);
+        let [bands, single] = [span(set, chains), 1].map(|span| bands(&panels, span));
+        Self { rows, inner, chains, panels, bands, single, values }
     }
 
     /// Writes `value(row, k)` everywhere; rows beyond `rows` stay 0.
@@ -110,24 +153,87 @@ pub struct Product<'a, const P: usize, E = f64> {
     pub ahead: &'a [E],
 }
 
-/// Multiplies: `out` holds one row of as many values as the matrices have rows for each column.
-#[inline(always)]
-pub fn multiply<S: Simd, E: Element, const P: usize>(simd: S, product: Product<'_, P, E>, out: &mut [E]) {
-    match product.matrices[0].chains {
-        2 => bands::<S, E, P, 2>(simd, &product, out),
-        _ => bands::<S, E, P, 1>(simd, &product, out),
+/// What happens to sums, and in which order the matrices are walked.
+#[derive(Debug, Clone, Copy)]
+pub struct Way<'a, E = f64> {
+    /// From the last panel to the first. Walked forwards and backwards in turn, a cache that is a little too small still holds the
+    /// panels that were read last.
+    pub backwards: bool,
+    /// What share of `out` stays, one value a row: `out <- keep out + sums`. Without, `out <- sums`.
+    pub keep: Option<&'a [E]>,
+}
+
+impl<E> Default for Way<'_, E> {
+    /// Forwards, and the sums alone.
+    fn default() -> Self {
+        Self { backwards: false, keep: None }
     }
 }
 
+/// Multiplies: `out` holds one row of as many values as the matrices have rows for each column.
 #[inline(always)]
-fn bands<S: Simd, E: Element, const P: usize, const K: usize>(simd: S, product: &Product<'_, P, E>, out: &mut [E]) {
-    for &(row, height) in &product.matrices[0].panels {
-        match height / lanes::<S, E>() {
-            4 => tiles::<S, E, P, 4, K>(simd, product, row, out),
-            3 => tiles::<S, E, P, 3, K>(simd, product, row, out),
-            2 => tiles::<S, E, P, 2, K>(simd, product, row, out),
-            _ => tiles::<S, E, P, 1, K>(simd, product, row, out),
+pub fn multiply<S: Simd, E: Element, const P: usize>(simd: S, product: Product<'_, P, E>, out: &mut [E]) {
+    multiply_into(simd, product, Way::default(), out);
+}
+
+/// Multiplies in a way of the caller's.
+#[inline(always)]
+pub fn multiply_into<S: Simd, E: Element, const P: usize>(
+    simd: S,
+    product: Product<'_, P, E>,
+    way: Way<'_, E>,
+    out: &mut [E],
+) {
+    match product.matrices[0].chains {
+        2 => walk::<S, E, P, 2>(simd, &Job { product, way }, out),
+        _ => walk::<S, E, P, 1>(simd, &Job { product, way }, out),
+    }
+}
+
+/// What all tiles of a product share.
+struct Job<'a, E, const P: usize> {
+    product: Product<'a, P, E>,
+    way: Way<'a, E>,
+}
+
+#[inline(always)]
+fn walk<S: Simd, E: Element, const P: usize, const K: usize>(simd: S, job: &Job<'_, E, P>, out: &mut [E]) {
+    let matrix = job.product.matrices[0];
+    let bands = if job.product.columns == 1 { &matrix.bands } else { &matrix.single };
+    for nth in 0..bands.len() {
+        let band = bands[if job.way.backwards { bands.len() - 1 - nth } else { nth }];
+        match (band.tall + band.short, band.height / lanes::<S, E>()) {
+            (2.., _) => spanning::<S, E, P, K>(simd, job, band, out),
+            (_, 4) => tiles::<S, E, P, 4, K>(simd, job, band.row, out),
+            (_, 3) => tiles::<S, E, P, 3, K>(simd, job, band.row, out),
+            (_, 2) => tiles::<S, E, P, 2, K>(simd, job, band.row, out),
+            _ => tiles::<S, E, P, 1, K>(simd, job, band.row, out),
         }
+    }
+}
+
+/// The band that a single tile spans.
+#[inline(always)]
+fn spanning<S: Simd, E: Element, const P: usize, const K: usize>(
+    simd: S,
+    job: &Job<'_, E, P>,
+    band: Band,
+    out: &mut [E],
+) {
+    let row = band.row;
+    match (band.height / lanes::<S, E>(), band.tall, band.short) {
+        (4, 3, _) => enter::<S, E, P, 4, 3, 1, 0, 1, K>(simd, job, row, 0, out),
+        (4, 2, 1) => enter::<S, E, P, 4, 2, 3, 1, 1, K>(simd, job, row, 0, out),
+        (4, 1, 2) => enter::<S, E, P, 4, 1, 3, 2, 1, K>(simd, job, row, 0, out),
+        (4, 2, _) => enter::<S, E, P, 4, 2, 1, 0, 1, K>(simd, job, row, 0, out),
+        (4, 1, 1) => enter::<S, E, P, 4, 1, 3, 1, 1, K>(simd, job, row, 0, out),
+        (3, 3, _) => enter::<S, E, P, 3, 3, 1, 0, 1, K>(simd, job, row, 0, out),
+        (3, 2, _) => enter::<S, E, P, 3, 2, 1, 0, 1, K>(simd, job, row, 0, out),
+        (3, 1, 1) => enter::<S, E, P, 3, 1, 2, 1, 1, K>(simd, job, row, 0, out),
+        (2, 4, _) => enter::<S, E, P, 2, 4, 1, 0, 1, K>(simd, job, row, 0, out),
+        (2, 3, _) => enter::<S, E, P, 2, 3, 1, 0, 1, K>(simd, job, row, 0, out),
+        (2, 2, _) => enter::<S, E, P, 2, 2, 1, 0, 1, K>(simd, job, row, 0, out),
+        _ => {}
     }
 }
 
@@ -135,26 +241,27 @@ fn bands<S: Simd, E: Element, const P: usize, const K: usize>(simd: S, product: 
 #[inline(always)]
 fn tiles<S: Simd, E: Element, const P: usize, const M: usize, const K: usize>(
     simd: S,
-    product: &Product<'_, P, E>,
+    job: &Job<'_, E, P>,
     row: usize,
     out: &mut [E],
 ) {
+    let columns = job.product.columns;
     let widest = (accumulators::<S>() / (M * K)).clamp(1, 6);
-    let tiles = product.columns.div_ceil(widest);
+    let tiles = columns.div_ceil(widest);
     let mut first = 0;
     for tile in 0..tiles {
         // No division where there is one tile: it would take longer than a small tile does.
         let width = match tiles {
-            1 => product.columns,
-            _ => product.columns / tiles + usize::from(tile < product.columns % tiles),
+            1 => columns,
+            _ => columns / tiles + usize::from(tile < columns % tiles),
         };
         match width {
-            6 => enter::<S, E, P, M, 6, K>(simd, product, row, first, out),
-            5 => enter::<S, E, P, M, 5, K>(simd, product, row, first, out),
-            4 => enter::<S, E, P, M, 4, K>(simd, product, row, first, out),
-            3 => enter::<S, E, P, M, 3, K>(simd, product, row, first, out),
-            2 => enter::<S, E, P, M, 2, K>(simd, product, row, first, out),
-            1 => enter::<S, E, P, M, 1, K>(simd, product, row, first, out),
+            6 => enter::<S, E, P, M, 1, 1, 0, 6, K>(simd, job, row, first, out),
+            5 => enter::<S, E, P, M, 1, 1, 0, 5, K>(simd, job, row, first, out),
+            4 => enter::<S, E, P, M, 1, 1, 0, 4, K>(simd, job, row, first, out),
+            3 => enter::<S, E, P, M, 1, 1, 0, 3, K>(simd, job, row, first, out),
+            2 => enter::<S, E, P, M, 1, 1, 0, 2, K>(simd, job, row, first, out),
+            1 => enter::<S, E, P, M, 1, 1, 0, 1, K>(simd, job, row, first, out),
             _ => {}
         }
         first += width;
@@ -163,86 +270,218 @@ fn tiles<S: Simd, E: Element, const P: usize, const M: usize, const K: usize>(
 
 /// Each tile is a function of its own: inlined into one, the many shapes would take minutes to compile.
 #[inline(never)]
-fn enter<S: Simd, E: Element, const P: usize, const M: usize, const N: usize, const K: usize>(
+fn enter<
+    S: Simd,
+    E: Element,
+    const P: usize,
+    const A: usize,
+    const T: usize,
+    const B: usize,
+    const U: usize,
+    const N: usize,
+    const K: usize,
+>(
     simd: S,
-    product: &Product<'_, P, E>,
+    job: &Job<'_, E, P>,
     row: usize,
     first: usize,
     out: &mut [E],
 ) {
     // A single chain is for seven vectors and more, which split into panels of three and four.
-    if is_used::<S, E>(M, N, K) && (K == 2 || M >= 3 || lanes::<S, E>() < E::ROWS || S::REGISTER_COUNT < 16) {
-        simd.vectorize(Tile::<E, P, M, N, K> { product, row, first, out });
+    let split = K == 2 || A >= 3 || lanes::<S, E>() < E::ROWS || S::REGISTER_COUNT < 16;
+    if is_used::<S, E>(A, N, K) && split && spans::<S, E>(A, T, U, K) {
+        simd.vectorize(Tile::<E, P, A, T, B, U, N, K> { job, row, first, out });
     }
 }
 
-/// M vectors of rows by N columns, in K interleaved chains.
-struct Tile<'a, E, const P: usize, const M: usize, const N: usize, const K: usize> {
-    product: &'a Product<'a, P, E>,
+/// Whether a tile of `tall` panels of so many vectors and `short` lower ones is ever asked for, see [`span`]; all others need
+/// not be compiled.
+const fn spans<S: Simd, E: Element>(vectors: usize, tall: usize, short: usize, chains: usize) -> bool {
+    let panels = tall + short;
+    match (S::REGISTER_COUNT, E::ROWS / lanes::<S, E>()) {
+        _ if panels == 1 => true,
+        (32.., 1) => panels == 2 && (chains == 1 || vectors == 3) || panels == 3 && chains == 1,
+        (32.., 4) => chains == 1 && short == 0,
+        (16..32, 2) => vectors == 2 && short == 0,
+        _ => false,
+    }
+}
+
+/// T panels of A vectors of rows, and U of B vectors, by N columns, in K interleaved chains.
+struct Tile<
+    'a,
+    E,
+    const P: usize,
+    const A: usize,
+    const T: usize,
+    const B: usize,
+    const U: usize,
+    const N: usize,
+    const K: usize,
+> {
+    job: &'a Job<'a, E, P>,
     row: usize,
     first: usize,
     out: &'a mut [E],
 }
 
-impl<E: Element, const P: usize, const M: usize, const N: usize, const K: usize> WithSimd for Tile<'_, E, P, M, N, K> {
+/// The sums of C panels of H vectors, by N columns in K chains: in registers, once all loops are unrolled.
+struct Sums<S: Simd, E: Element, const H: usize, const C: usize, const N: usize, const K: usize>(
+    [[[[E::Vector<S>; N]; H]; C]; K],
+);
+
+impl<S: Simd, E: Element, const H: usize, const C: usize, const N: usize, const K: usize> Sums<S, E, H, C, N, K> {
+    #[inline(always)]
+    fn start(simd: S, starts: &[E::Vector<S>]) -> Self {
+        let mut sums = [[[[E::splat(simd, E::ZERO); N]; H]; C]; K];
+        for c in 0..C {
+            for h in 0..H {
+                sums[0][c][h] = [starts[c * H + h]; N];
+            }
+        }
+        Self(sums)
+    }
+
+    /// Adds the products of one value of column `n` with the weights of its k.
+    #[inline(always)]
+    fn add(&mut self, simd: S, chain: usize, n: usize, weights: [&[E::Vector<S>; H]; C], x: E::Vector<S>) {
+        for c in 0..C {
+            for h in 0..H {
+                let sum = &mut self.0[chain][c][h][n];
+                *sum = E::mul_add(simd, weights[c][h], x, *sum);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn sum(&self, simd: S, c: usize, h: usize, n: usize) -> E::Vector<S> {
+        let sum = self.0[0][c][h][n];
+        if K == 2 { E::add(simd, sum, self.0[K - 1][c][h][n]) } else { sum }
+    }
+
+    /// `out <- sums` of column `n`.
+    #[inline(always)]
+    fn store(&self, simd: S, n: usize, out: &mut [E::Vector<S>]) {
+        let out = &mut out[..C * H];
+        for c in 0..C {
+            for h in 0..H {
+                out[c * H + h] = self.sum(simd, c, h, n);
+            }
+        }
+    }
+
+    /// `out <- keep out + sums` of column `n`.
+    #[inline(always)]
+    fn blend(&self, simd: S, n: usize, keep: &[E::Vector<S>], out: &mut [E::Vector<S>]) {
+        let (keep, out) = (&keep[..C * H], &mut out[..C * H]);
+        for c in 0..C {
+            for h in 0..H {
+                let at = c * H + h;
+                out[at] = E::mul_add(simd, keep[at], out[at], self.sum(simd, c, h, n));
+            }
+        }
+    }
+}
+
+/// C panels of H vectors for each k: two k at a time, then the last k of an odd number.
+struct Weights<'a, S: Simd, E: Element, const H: usize, const C: usize> {
+    pairs: [&'a [[[E::Vector<S>; H]; 2]]; C],
+    last: [&'a [[E::Vector<S>; H]]; C],
+}
+
+impl<'a, S: Simd, E: Element, const H: usize, const C: usize> Weights<'a, S, E, H, C> {
+    /// Takes them off the front of `values`.
+    #[inline(always)]
+    fn take(values: &mut &'a [E], inner: usize) -> Self {
+        let (mut pairs, mut last) = ([[].as_slice(); C], [[].as_slice(); C]);
+        for c in 0..C {
+            let (panel, rest) = values.split_at(H * lanes::<S, E>() * inner);
+            let (whole, odd) = E::vectors::<S>(panel).as_chunks::<H>().0.as_chunks::<2>();
+            (pairs[c], last[c], *values) = (&whole[..inner / 2], odd, rest);
+        }
+        Self { pairs, last }
+    }
+
+    #[inline(always)]
+    fn at(&self, k: usize, half: usize) -> [&'a [E::Vector<S>; H]; C] {
+        std::array::from_fn(|c| &self.pairs[c][k][half])
+    }
+
+    #[inline(always)]
+    fn last(&self) -> [&'a [E::Vector<S>; H]; C] {
+        std::array::from_fn(|c| &self.last[c][0])
+    }
+}
+
+impl<
+    E: Element,
+    const P: usize,
+    const A: usize,
+    const T: usize,
+    const B: usize,
+    const U: usize,
+    const N: usize,
+    const K: usize,
+> WithSimd for Tile<'_, E, P, A, T, B, U, N, K>
+{
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { product, row, first, out } = self;
-        let height = M * lanes::<S, E>();
+        let Self { job, row, first, out } = self;
+        let Job { product, way } = job;
+        let height = (T * A + U * B) * lanes::<S, E>();
         let mut ahead = product.ahead.as_chunks::<LINE>().0.iter().skip(row);
         let mut fetched = E::ZERO;
-        let mut sums = [[[E::splat(simd, E::ZERO); N]; M]; K];
         let starts = E::vectors::<S>(&product.start[row..row + height]);
-        for m in 0..M {
-            for n in 0..N {
-                sums[0][m][n] = starts[m];
-            }
-        }
+        let mut tall = Sums::<S, E, A, T, N, K>::start(simd, starts);
+        let mut short = Sums::<S, E, B, U, N, K>::start(simd, &starts[T * A..]);
         for p in 0..P {
             let inner = product.matrices[p].inner;
-            let panel = E::vectors::<S>(&product.matrices[p].values[row * inner..(row + height) * inner]);
-            let (weights, _) = panel.as_chunks::<M>();
-            let (pairs, rest) = weights.as_chunks::<2>();
+            let mut panels = &product.matrices[p].values[row * inner..(row + height) * inner];
+            let higher = Weights::<S, E, A, T>::take(&mut panels, inner);
+            let lower = Weights::<S, E, B, U>::take(&mut panels, inner);
             let source = product.sources[p];
-            let mut column = [[].as_slice(); N];
+            let (mut column, mut paired) = ([[].as_slice(); N], [[].as_slice(); N]);
             for n in 0..N {
                 column[n] = &source.values[(first + n) * source.stride..][..inner];
+                paired[n] = &column[n].as_chunks::<2>().0[..inner / 2];
             }
-            let mut paired = [[].as_slice(); N];
-            for n in 0..N {
-                paired[n] = &column[n].as_chunks::<2>().0[..pairs.len()];
-            }
-            for k in 0..pairs.len() {
+            for k in 0..inner / 2 {
                 if let Some(line) = ahead.next() {
                     fetched += line[0];
                 }
                 for half in 0..2 {
                     for n in 0..N {
                         let x = E::splat(simd, paired[n][k][half]);
-                        for m in 0..M {
-                            let sum = &mut sums[half % K][m][n];
-                            *sum = E::mul_add(simd, pairs[k][half][m], x, *sum);
-                        }
+                        tall.add(simd, half % K, n, higher.at(k, half), x);
+                        short.add(simd, half % K, n, lower.at(k, half), x);
                     }
                 }
             }
-            if let [last] = rest {
+            if inner % 2 == 1 {
                 for n in 0..N {
                     let x = E::splat(simd, column[n][inner - 1]);
-                    for m in 0..M {
-                        sums[0][m][n] = E::mul_add(simd, last[m], x, sums[0][m][n]);
-                    }
+                    tall.add(simd, 0, n, higher.last(), x);
+                    short.add(simd, 0, n, lower.last(), x);
                 }
             }
         }
         black_box(fetched);
         let rows = product.matrices[0].rows;
+        let keep = way.keep.map(|keep| E::vectors::<S>(&keep[row..row + height]));
         for n in 0..N {
             let out = E::vectors_mut::<S>(&mut out[(first + n) * rows + row..][..height]);
-            for m in 0..M {
-                out[m] = if K == 2 { E::add(simd, sums[0][m][n], sums[K - 1][m][n]) } else { sums[0][m][n] };
+            let (higher, lower) = out.split_at_mut(T * A);
+            match keep {
+                Some(keep) => {
+                    tall.blend(simd, n, keep, higher);
+                    short.blend(simd, n, &keep[T * A..], lower);
+                }
+                None => {
+                    tall.store(simd, n, higher);
+                    short.store(simd, n, lower);
+                }
             }
         }
     }

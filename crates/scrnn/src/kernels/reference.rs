@@ -30,7 +30,7 @@ pub fn accumulate(delta: &[f64], rows: usize, state: &[f64], inner: usize) -> Ve
 mod tests {
     use super::super::element::Element;
     use super::super::outer::{self, Rows, Taken};
-    use super::super::panels::{self, Columns, Panels, Product};
+    use super::super::panels::{self, Columns, Panels, Product, Way};
     use crate::engine::{InstructionSet, Run};
     use proptest::prelude::*;
     use pulp::{Simd, WithSimd};
@@ -40,6 +40,7 @@ mod tests {
         source: Columns<'a, E>,
         columns: usize,
         start: &'a [E],
+        way: Way<'a, E>,
         out: &'a mut [E],
     }
 
@@ -50,7 +51,7 @@ mod tests {
         fn with_simd<S: Simd>(self, simd: S) {
             let (matrices, sources) = ([self.matrix], [self.source]);
             let product = Product { matrices, sources, columns: self.columns, start: self.start, ahead: &[] };
-            panels::multiply(simd, product, self.out);
+            panels::multiply_into(simd, product, self.way, self.out);
         }
     }
 
@@ -95,8 +96,15 @@ mod tests {
         padded_start.resize(E::padded(rows), E::ZERO);
         let mut out = vec![E::from_f64(f64::NAN); columns * E::padded(rows)];
         let source_columns = Columns { values: &source, stride: inner };
-        let work = Multiply { matrix: &packed, source: source_columns, columns, start: &padded_start, out: &mut out };
-        set.run(work);
+        let run = |way: Way<'_, E>, out: &mut [E]| {
+            set.run(Multiply { matrix: &packed, source: source_columns, columns, start: &padded_start, way, out });
+        };
+        run(Way::default(), &mut out);
+        // Walked the other way, and with a half of what is there, which is then added.
+        let mut again = out.clone();
+        run(Way { backwards: true, keep: Some(&vec![E::from_f64(0.5); E::padded(rows)]) }, &mut again);
+        let blended = |once: &E| E::from_f64(0.5_f64.mul_add(once.to_f64(), once.to_f64()));
+        assert!(out.iter().zip(&again).all(|(once, more)| *more == blended(once)));
         let fast = out.chunks_exact(E::padded(rows)).flat_map(|column| wide(&column[..rows])).collect();
         (fast, super::multiply(&wide(&matrix), &wide(&source), inner, &wide(&start)))
     }
@@ -182,7 +190,9 @@ mod tests {
     }
 
     fn sums_are_the_same_everywhere<E: Element>() {
-        for (rows, inner) in [(12, 13), (36, 34), (64, 62), (200, 77)] {
+        // One column is summed in tiles that span panels: all numbers of panels, high and low.
+        let spanned = (1..=20).map(|groups| (E::ROWS * groups - 3, 9));
+        for (rows, inner) in [(12, 13), (36, 34), (64, 62), (200, 77)].into_iter().chain(spanned) {
             let (many, _) = multiply_fast::<E>(InstructionSet::Portable, rows, inner, 13);
             for set in InstructionSet::available() {
                 for columns in 1..13 {
