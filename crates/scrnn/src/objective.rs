@@ -19,6 +19,7 @@ use crate::topology::Topology;
 
 mod closed;
 mod cpu;
+mod relay;
 
 /// Makes objectives.
 pub trait Backend {

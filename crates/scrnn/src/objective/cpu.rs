@@ -1,19 +1,20 @@
 //! The objective on the processor: blocks in parallel, one ordered sum.
 //!
-//! Blocks are worked on by any thread; their gradients are added in the order of the blocks, so the bits do not depend
-//! on the number of threads. All memory is taken on the calling thread, for the largest list of runs so far; an evaluation
+//! Blocks are worked on by any thread, and where there are more threads than blocks, others follow with the gradient of the weights, see
+//! [`super::relay`]; the blocks' gradients are added in the order of the blocks, so the bits do not depend on the number of threads. All memory is taken on the calling thread, for the largest list of runs so far; an evaluation
 //! that needs no more allocates nothing. Samples are read where the data set has them.
 //!
 //! Runs through sequences without missing values that are taught throughout know all of their inputs beforehand, and take the fast
 //! way. All others go step by step, see [`super::closed`]; theirs are added after.
 
 use std::ops::Range;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use aligned_vec::AVec;
 use pulp::{Simd, WithSimd};
 
 use super::closed::{self, ClosedBlock, EvaluateClosed};
+use super::relay::{Gather, Relay, Segment};
 use super::{Backend, ClosedLoopTerm, Evaluation, Objective, Request, Run, Want};
 use crate::batch::{self, Block};
 use crate::dataset::{Dataset, Sequence};
@@ -44,12 +45,16 @@ impl Backend for Engine {
     }
 }
 
-/// A block and its results.
-#[derive(Debug)]
-struct Job {
+/// A block, and how its steps are cut.
+#[derive(Debug, Default)]
+struct Part {
     block: Block,
     cut: Cut,
-    gradient: AVec<f64>,
+}
+
+/// What comes of a block besides the gradient of the weights.
+#[derive(Debug, Default)]
+struct Found {
     /// [column][unit].
     initial: Vec<f64>,
     /// [column][channel].
@@ -57,26 +62,12 @@ struct Job {
     squared_error: Vec<f64>,
 }
 
-impl Job {
-    fn new() -> Self {
-        Self {
-            block: Block::default(),
-            cut: Cut::default(),
-            gradient: AVec::new(64),
-            initial: Vec::new(),
-            ln_likelihood: Vec::new(),
-            squared_error: Vec::new(),
-        }
-    }
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
-    /// Takes over the columns `own` of `runs`.
-    fn fill(&mut self, packed: &Packed, runs: &[Run], own: &[usize], recompute: bool) {
-        self.block.fill(runs, own);
-        self.cut = Cut::new(packed, &self.block, recompute);
-        self.initial.resize(own.len() * packed.n_c, 0.0);
-        self.ln_likelihood.resize(own.len() * packed.n_y, 0.0);
-        self.squared_error.resize(own.len() * packed.n_y, 0.0);
-    }
+fn own<T>(mutex: &mut Mutex<T>) -> &mut T {
+    mutex.get_mut().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Evaluates the objective again and again on runs through the same sequences.
@@ -103,10 +94,12 @@ struct CpuObjective {
     packed: Packed,
     /// Whether the last parameters were of this network.
     fits: bool,
-    /// The runs that the first `blocks` jobs are made for.
+    /// The runs that the first `blocks` parts are made of.
     runs: Vec<Run>,
-    jobs: Vec<Job>,
+    parts: Vec<Part>,
+    found_of: Vec<Mutex<Found>>,
     blocks: usize,
+    relay: Relay,
     order: Vec<usize>,
     /// One for each block that can be worked on at the same time.
     records: Mutex<Vec<Trajectory>>,
@@ -137,8 +130,10 @@ impl CpuObjective {
             recompute: request.recompute,
             fits: false,
             runs: Vec::new(),
-            jobs: Vec::new(),
+            parts: Vec::new(),
+            found_of: Vec::new(),
             blocks: 0,
+            relay: Relay::default(),
             order: Vec::new(),
             records: Mutex::new(Vec::new()),
             sum: AVec::new(64),
@@ -171,44 +166,60 @@ impl CpuObjective {
             self.runs.clear();
             self.runs.extend_from_slice(runs);
             self.blocks = 0;
-            batch::split(&self.topology, runs, &mut self.order, |index, own| {
-                if index == self.jobs.len() {
-                    self.jobs.push(Job::new());
+            batch::split(&self.topology, runs, &mut self.order, |index, columns| {
+                if index == self.parts.len() {
+                    self.parts.push(Part::default());
+                    self.found_of.push(Mutex::default());
                 }
-                self.jobs[index].fill(&self.packed, runs, own, self.recompute);
+                let (part, found) = (&mut self.parts[index], own(&mut self.found_of[index]));
+                part.block.fill(runs, columns);
+                part.cut = Cut::new(&self.packed, &part.block, self.recompute);
+                found.initial.resize(columns.len() * self.packed.n_c, 0.0);
+                found.ln_likelihood.resize(columns.len() * self.packed.n_y, 0.0);
+                found.squared_error.resize(columns.len() * self.packed.n_y, 0.0);
                 self.blocks = index + 1;
             });
-            let records = self.records.get_mut().unwrap_or_else(PoisonError::into_inner);
+            let records = own(&mut self.records);
             while records.len() < self.engine.threads().min(self.blocks) {
                 records.push(Trajectory::new());
             }
             for record in records {
-                self.jobs[..self.blocks].iter().for_each(|job| record.fit(&self.packed, &job.block, job.cut));
+                self.parts[..self.blocks].iter().for_each(|part| record.fit(&self.packed, &part.block, part.cut));
             }
         }
+        let parts = &self.parts[..self.blocks];
+        let deltas = parts.iter().map(|part| part.cut.deltas(&self.packed, part.block.columns())).max();
+        self.relay.prepare(self.blocks, deltas.filter(|_| self.has_followers(want)));
         if want == Want::Everything {
             let len = self.packed.gradient_len();
             self.sum.resize(len, 0.0);
-            self.jobs[..self.blocks].iter_mut().for_each(|job| job.gradient.resize(len, 0.0));
+            (0..self.blocks).for_each(|block| self.relay.gradient(block).resize(len, 0.0));
         }
+    }
+
+    /// Whether threads without a block follow the others with the gradient of the weights.
+    fn has_followers(&self, want: Want) -> bool {
+        want == Want::Everything
+            && self.engine.threads() > self.blocks
+            && batch::is_worth_following(&self.topology, &self.runs)
     }
 
     fn collect(&mut self, want: Want, evaluation: &mut Evaluation) {
         let (n_c, n_y) = (self.packed.n_c, self.packed.n_y);
-        let jobs = &self.jobs[..self.blocks];
-        for job in jobs {
-            for (column, &run) in job.block.runs.iter().enumerate() {
+        for (part, found) in self.parts[..self.blocks].iter().zip(&mut self.found_of) {
+            let found = own(found);
+            for (column, &run) in part.block.runs.iter().enumerate() {
                 let own = column * n_y..(column + 1) * n_y;
-                evaluation.ln_likelihood[run] = job.ln_likelihood[own.clone()].iter().sum();
-                evaluation.squared_error[run] = job.squared_error[own.clone()].iter().sum();
+                evaluation.ln_likelihood[run] = found.ln_likelihood[own.clone()].iter().sum();
+                evaluation.squared_error[run] = found.squared_error[own.clone()].iter().sum();
                 if self.features.has_skip() {
-                    evaluation.ln_likelihood[run] -= job.block.lengths[column] as f64 * self.ln_scale;
-                    let squares = job.squared_error[own].iter().enumerate();
+                    evaluation.ln_likelihood[run] -= part.block.lengths[column] as f64 * self.ln_scale;
+                    let squares = found.squared_error[own].iter().enumerate();
                     evaluation.squared_error[run] = squares.map(|(i, sum)| self.features.scale(i).powi(2) * sum).sum();
                 }
                 if want != Want::Score {
                     let out = &mut evaluation.initial[run * n_c..(run + 1) * n_c];
-                    let own = &job.initial[column * n_c..(column + 1) * n_c];
+                    let own = &found.initial[column * n_c..(column + 1) * n_c];
                     for ((out, own), &learns) in out.iter_mut().zip(own).zip(&self.learns) {
                         *out = if learns { *own } else { 0.0 };
                     }
@@ -216,12 +227,12 @@ impl CpuObjective {
             }
         }
         if want == Want::Everything {
-            match jobs.split_first() {
-                Some((first, _)) => self.sum.copy_from_slice(&first.gradient),
-                None => self.sum.fill(0.0),
+            match self.blocks {
+                0 => self.sum.fill(0.0),
+                _ => self.sum.copy_from_slice(self.relay.gradient(0)),
             }
-            for job in jobs.iter().skip(1) {
-                for (sum, own) in self.sum.iter_mut().zip(job.gradient.iter()) {
+            for block in 1..self.blocks {
+                for (sum, own) in self.sum.iter_mut().zip(self.relay.gradient(block).iter()) {
                     *sum += own;
                 }
             }
@@ -261,26 +272,35 @@ impl CpuObjective {
     fn evaluate_taught(&mut self, runs: &[Run], initial: &[f64], want: Want, evaluation: &mut Evaluation) {
         self.plan(runs, want);
         let set = self.engine.instruction_set();
-        let (packed, records) = (&self.packed, &self.records);
+        let (packed, records, parts, relay) = (&self.packed, &self.records, &self.parts, &self.relay);
+        let found_of = &self.found_of;
         let (inputs, targets) = match &self.taught {
             Some((inputs, targets)) => (inputs.sequences(), targets.sequences()),
             None => (self.data.sequences(), self.data.sequences()),
         };
-        self.engine.for_each(&mut self.jobs[..self.blocks], |job| {
-            let lock = || records.lock().unwrap_or_else(PoisonError::into_inner);
-            let record = lock().pop();
+        let gather = |block: usize, segment: &Segment, states: &[f64], gradient: &mut [f64]| {
+            set.run(GatherSegment { packed, block: &parts[block].block, segment, states, gradient });
+        };
+        let run = |block: usize| {
+            let part = &parts[block];
+            let record = locked(records).pop();
             let mut trajectory = record.unwrap_or_else(|| {
                 let mut record = Trajectory::new();
-                record.fit(packed, &job.block, job.cut);
+                record.fit(packed, &part.block, part.cut);
                 record
             });
             if want == Want::Everything {
-                job.gradient.fill(0.0);
+                relay.clear(block);
             }
-            forward::start(packed, &job.block, initial, &mut trajectory);
-            set.run(Evaluate { packed, inputs, targets, job, trajectory: &mut trajectory, want });
-            lock().push(trajectory);
-        });
+            forward::start(packed, &part.block, initial, &mut trajectory);
+            let found = &mut *locked(&found_of[block]);
+            let way_back = WayBack { relay, block, gather: &gather };
+            set.run(Evaluate { packed, inputs, targets, part, found, trajectory: &mut trajectory, want, way_back });
+            locked(records).push(trajectory);
+        };
+        let most = if self.has_followers(want) { 2 * self.blocks } else { self.blocks };
+        let mut threads = vec![(); self.engine.threads().min(most)];
+        self.engine.for_each(&mut threads, |()| relay.work(run, gather));
         self.collect(want, evaluation);
     }
 
@@ -367,13 +387,42 @@ impl CpuObjective {
 }
 
 /// One block, forward and back.
-struct Evaluate<'a> {
+struct Evaluate<'a, G> {
     packed: &'a Packed,
     inputs: &'a [Sequence],
     targets: &'a [Sequence],
-    job: &'a mut Job,
+    part: &'a Part,
+    found: &'a mut Found,
     trajectory: &'a mut Trajectory,
     want: Want,
+    way_back: WayBack<'a, G>,
+}
+
+/// Where a block's segments go on the way back.
+struct WayBack<'a, G> {
+    relay: &'a Relay,
+    /// The block's number.
+    block: usize,
+    gather: &'a G,
+}
+
+/// A segment's part of the gradient of the weights.
+struct GatherSegment<'a> {
+    packed: &'a Packed,
+    block: &'a Block,
+    segment: &'a Segment,
+    states: &'a [f64],
+    gradient: &'a mut [f64],
+}
+
+impl WithSimd for GatherSegment<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { packed, block, segment: Segment { products, span_start, deltas }, states, gradient } = self;
+        crate::backward::gather(simd, packed, block, products.clone(), *span_start, (deltas, states), gradient);
+    }
 }
 
 /// The segments of a span.
@@ -383,63 +432,82 @@ fn segments(cut: Cut, span: &Range<usize>) -> impl DoubleEndedIterator<Item = Ra
     (0..count).map(move |i| start + i * cut.segment..(start + (i + 1) * cut.segment).min(end))
 }
 
-impl WithSimd for Evaluate<'_> {
+impl<G: Gather> WithSimd for Evaluate<'_, G> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        let Self { packed, inputs, targets, job, trajectory, want } = self;
-        let cut = job.cut;
-        let n = job.block.columns();
-        job.ln_likelihood.fill(0.0);
-        job.squared_error.fill(0.0);
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        self.go_forward(simd);
+        if self.want != Want::Score {
+            self.go_back(simd);
+        }
+    }
+}
 
+impl<G: Gather> Evaluate<'_, G> {
+    #[inline(always)]
+    fn go_forward<S: Simd>(&mut self, simd: S) {
+        let Self { packed, inputs, targets, part: Part { block, cut }, found, trajectory, .. } = self;
+        let n = block.columns();
+        found.ln_likelihood.fill(0.0);
+        found.squared_error.fill(0.0);
         for index in 0..cut.spans() {
             let span = cut.span_range(index);
             if cut.spans() > 1 {
                 let kept = &mut trajectory.span_starts[index * n * packed.rows..(index + 1) * n * packed.rows];
                 kept.copy_from_slice(&trajectory.internal[..n * packed.rows]);
             }
-            forward::enter_span(simd, packed, &job.block, inputs, span.clone(), trajectory);
-            for segment in segments(cut, &span) {
-                forward::run(simd, packed, &job.block, segment.clone(), span.start, true, trajectory);
-                score(simd, packed, targets, job, segment, trajectory);
+            forward::enter_span(simd, packed, block, inputs, span.clone(), trajectory);
+            for segment in segments(*cut, &span) {
+                forward::run(simd, packed, block, segment.clone(), span.start, true, trajectory);
+                score(simd, packed, targets, (block, &mut **found), segment, trajectory);
             }
         }
         // A state that is no longer finite stays so: it must not hide behind the bounds of tanh.
         for (column, u) in trajectory.internal.chunks_exact(packed.rows).enumerate().take(n) {
             if !u[..packed.n_c].iter().all(|u| u.is_finite()) {
-                job.ln_likelihood[column * packed.n_y] = f64::NAN;
+                found.ln_likelihood[column * packed.n_y] = f64::NAN;
             }
         }
-        if want == Want::Score {
-            return;
-        }
+    }
 
+    #[inline(always)]
+    fn go_back<S: Simd>(&mut self, simd: S) {
+        let Self { packed, inputs, part: Part { block, cut }, found, trajectory, want, way_back, .. } = self;
+        let WayBack { relay, block: number, gather } = *way_back;
+        let n = block.columns();
         let row = n * packed.delta_stride;
+        relay.rouse();
         for index in (0..cut.spans()).rev() {
             let span = cut.span_range(index);
             if index + 1 < cut.spans() {
                 let kept = &trajectory.span_starts[index * n * packed.rows..(index + 1) * n * packed.rows];
                 trajectory.internal[..n * packed.rows].copy_from_slice(kept);
-                forward::enter_span(simd, packed, &job.block, inputs, span.clone(), trajectory);
-                forward::run(simd, packed, &job.block, span.clone(), span.start, false, trajectory);
+                forward::enter_span(simd, packed, block, inputs, span.clone(), trajectory);
+                forward::run(simd, packed, block, span.clone(), span.start, false, trajectory);
             }
-            for segment in segments(cut, &span).rev() {
-                if segment.end < cut.products {
-                    // d/du of the later segment's start is this one's end.
-                    trajectory.deltas.copy_within(..row, segment.len() * row);
+            relay.exchange(number, &mut trajectory.states);
+            let states = relay.states(number);
+            for segment in segments(*cut, &span).rev() {
+                crate::backward::run(simd, packed, block, segment.clone(), span.start, &states, trajectory);
+                // d/du of this segment's start is the end of the one before it; all of those are whole.
+                let next = if segment.start == 0 { 0 } else { cut.segment * row };
+                if segment.start == 0 {
+                    let starts = trajectory.deltas.chunks_exact(packed.delta_stride);
+                    for (out, start) in found.initial.chunks_exact_mut(packed.n_c).zip(starts) {
+                        out.copy_from_slice(&start[..packed.n_c]);
+                    }
                 }
-                crate::backward::run(simd, packed, &job.block, segment.clone(), span.start, trajectory);
-                if want == Want::Everything {
-                    let gradient = &mut job.gradient;
-                    crate::backward::gather(simd, packed, &job.block, segment, span.start, trajectory, gradient);
+                match want {
+                    Want::Everything => {
+                        relay.hand_over(number, segment, span.start, &mut trajectory.deltas, (row, next), gather);
+                    }
+                    _ => trajectory.deltas.copy_within(..row, next),
                 }
             }
-        }
-        let starts = trajectory.deltas.chunks_exact(packed.delta_stride);
-        for (out, start) in job.initial.chunks_exact_mut(packed.n_c).zip(starts) {
-            out.copy_from_slice(&start[..packed.n_c]);
+            drop(states);
+            relay.finish(number, gather);
+            relay.exchange(number, &mut trajectory.states);
         }
     }
 }
@@ -450,11 +518,11 @@ fn score<S: Simd>(
     simd: S,
     packed: &Packed,
     targets: &[Sequence],
-    job: &mut Job,
+    (block, found): (&Block, &mut Found),
     segment: Range<usize>,
     trajectory: &mut Trajectory,
 ) {
-    let Job { block, ln_likelihood, squared_error, .. } = job;
+    let Found { ln_likelihood, squared_error, .. } = found;
     let (n, n_y) = (block.columns(), packed.n_y);
     let products = segment.start.max(1)..segment.end;
     let first = products.start;
