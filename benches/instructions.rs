@@ -9,12 +9,11 @@
 //! record (`benches/instructions.txt`) holds for one compiler: with another one differences are told, and do not fail.
 //! Valgrind knows no AVX-512, so this is the AVX2 code.
 //!
-//! `--time` prints the seconds of one call by the clock instead, of any size: `forward/60x2x6` is units, channels and
+//! `--time` prints the seconds of one call by the clock instead, the least and the median, of any size: `forward/60x2x6` is units, channels and
 //! columns, `epoch/60x2x12x1000` units, channels, sequences and steps (and, if a fifth number is given, threads). So two
-//! builds of this program can take turns.
+//! builds of this program can take turns. `--time peak` is what the machine can do.
 
 mod fixtures;
-#[allow(dead_code, reason = "the peak is for benches that measure by the clock")]
 mod machine;
 mod training;
 
@@ -23,7 +22,7 @@ use std::process::{Command, ExitCode};
 use std::time::{Duration, Instant};
 
 use fixtures::{Elements, Kernel, Repeat, Size, values};
-use machine::{on, seconds_per_call};
+use machine::{median, on, peak_gflops, seconds_per_call};
 use scrnn::engine::{Engine, InstructionSet};
 use scrnn::generation::{Feedback, Running};
 use scrnn::initialization::initialize;
@@ -135,13 +134,18 @@ impl Work {
     }
 }
 
-/// Prints the seconds of one call, the least of some bursts.
+/// Prints the seconds of one call, the least and the median of some bursts; of `peak`, operations a second in units of 1e9.
 fn time(name: &str, set: InstructionSet) -> Result<(), String> {
+    if name == "peak" {
+        let bursts: Vec<f64> = (0..15).map(|_| peak_gflops(set, 1)).collect();
+        println!("{:.1} {:.1}", bursts.iter().copied().fold(0.0, f64::max), median(bursts));
+        return Ok(());
+    }
     let mut work = Work::new(name, set)?;
-    let least = match &mut work {
+    let bursts: Vec<f64> = match &mut work {
         Work::Epoch(training) => {
             training.time(1);
-            (0..7).map(|_| training.time(1).as_secs_f64()).fold(f64::INFINITY, f64::min)
+            (0..7).map(|_| training.time(1).as_secs_f64()).collect()
         }
         work => {
             let burst = |work: &mut Work| {
@@ -149,10 +153,10 @@ fn time(name: &str, set: InstructionSet) -> Result<(), String> {
                     work.run(calls);
                 })
             };
-            (0..15).map(|_| burst(work)).fold(f64::INFINITY, f64::min)
+            (0..15).map(|_| burst(work)).collect()
         }
     };
-    println!("{least:.4e}");
+    println!("{:.4e} {:.4e}", bursts.iter().copied().fold(f64::INFINITY, f64::min), median(bursts));
     Ok(())
 }
 

@@ -46,8 +46,8 @@ pub(crate) fn retreat<S: Simd, E: Element>(
     }
 }
 
-/// Goes back through the products of `range`, a segment of the span that starts at `span_start`. The delta row behind
-/// the segment's last product must hold d/du of the step after it; afterwards, row 0 holds d/du of the segment's start.
+/// Goes back through the products of `range`, a segment of the span that starts at `span_start` and has these `states`. The delta row
+/// behind the segment's last product must hold d/du of the step after it; afterwards, row 0 holds d/du of the segment's start.
 #[inline(always)]
 pub(crate) fn run<S: Simd, E: Element>(
     simd: S,
@@ -55,6 +55,7 @@ pub(crate) fn run<S: Simd, E: Element>(
     block: &Block,
     range: std::ops::Range<usize>,
     span_start: usize,
+    states: &[E],
     trajectory: &mut Trajectory<E>,
 ) {
     let (n, n_y, n_c) = (block.columns(), packed.n_y, packed.n_c);
@@ -82,14 +83,14 @@ pub(crate) fn run<S: Simd, E: Element>(
             }
         }
         let at = (k - span_start) * n * state_stride;
-        let states = &trajectory.states[at..at + n * state_stride];
+        let own = &states[at..at + n * state_stride];
         let sources = [Columns { values: after, stride: delta_stride }];
         let matrices = [&packed.backward];
         // The states of the step before: they were written long ago, and left the cache since.
-        let ahead = &trajectory.states[at - (n * state_stride).min(at)..at];
+        let ahead = &states[at - (n * state_stride).min(at)..at];
         let product = Product { matrices, sources, columns: active, start: &packed.zeros, ahead };
         multiply_into(simd, product, Way { backwards: k % 2 == 1, keep: None }, &mut trajectory.drive);
-        retreat(simd, packed, &trajectory.drive, states, after, before, active);
+        retreat(simd, packed, &trajectory.drive, own, after, before, active);
     }
 }
 
@@ -102,7 +103,7 @@ pub(crate) fn gather<S: Simd, E: Element>(
     block: &Block,
     range: std::ops::Range<usize>,
     span_start: usize,
-    trajectory: &Trajectory<E>,
+    (deltas, states): (&[E], &[E]),
     gradient: &mut [E],
 ) {
     let n = block.columns();
@@ -112,8 +113,8 @@ pub(crate) fn gather<S: Simd, E: Element>(
             true => Taken::from(part.len() * n),
             false => Taken { groups: part.len(), width: active, period: n },
         };
-        let deltas = &trajectory.deltas[(part.start - range.start + 1) * n * packed.delta_stride..];
-        let states = &trajectory.states[(part.start - span_start) * n * packed.state_stride..];
+        let deltas = &deltas[(part.start - range.start + 1) * n * packed.delta_stride..];
+        let states = &states[(part.start - span_start) * n * packed.state_stride..];
         let deltas = Rows { values: deltas, stride: packed.delta_stride };
         let states = Rows { values: states, stride: packed.state_stride };
         accumulate(simd, deltas, states, taken, packed.rows, (0, packed.n_c), context);

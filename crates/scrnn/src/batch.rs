@@ -76,14 +76,24 @@ impl Block {
     }
 }
 
+/// Recurrent weights times steps of all columns.
+fn work(topology: &Topology, runs: &[Run]) -> usize {
+    runs.iter().map(|run| run.steps).sum::<usize>().saturating_mul(topology.context_units().pow(2))
+}
+
+/// Whether there is so much to do that threads without a block should follow the others: 2 ms of one thread. A follower is woken in the
+/// middle, and takes a quarter of the work at most.
+pub(crate) fn is_worth_following(topology: &Topology, runs: &[Run]) -> bool {
+    work(topology, runs) >= 4 * WORTH_TWO
+}
+
 /// Splits runs into blocks and gives each block's columns, with the number of the block, to `take`. `order` is scratch.
 pub(crate) fn split(topology: &Topology, runs: &[Run], order: &mut Vec<usize>, mut take: impl FnMut(usize, &[usize])) {
     let weights = topology.context_units().pow(2);
     let width = if weights * size_of::<f64>() <= NEAR { NARROW } else { WIDE };
-    let work = runs.iter().map(|run| run.steps).sum::<usize>().saturating_mul(weights);
     // An even number of blocks lets two workers finish together.
     let count = match runs.len().div_ceil(width) {
-        1 if 2 * runs.len() <= width || work < WORTH_TWO => 1,
+        1 if 2 * runs.len() <= width || work(topology, runs) < WORTH_TWO => 1,
         count => count.next_multiple_of(2),
     };
     order.clear();

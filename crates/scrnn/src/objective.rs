@@ -19,6 +19,7 @@ use crate::topology::Topology;
 
 mod closed;
 mod cpu;
+mod relay;
 mod taught;
 
 /// Makes objectives.

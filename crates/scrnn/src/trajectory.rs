@@ -41,6 +41,11 @@ impl Cut {
         Self { products, segment, span }
     }
 
+    /// Values of the deltas of a segment of `columns` columns.
+    pub fn deltas<E: Element>(self, packed: &Packed<E>, columns: usize) -> usize {
+        ((self.segment + 1) * columns + 1) * packed.delta_stride
+    }
+
     pub fn spans(self) -> usize {
         self.products.div_ceil(self.span)
     }
@@ -104,7 +109,7 @@ impl<E: Element> Trajectory<E> {
         grow(&mut self.span_starts, cut.spans() * n * packed.rows);
         grow(&mut self.mean, block.steps() * n * packed.n_y);
         grow(&mut self.variance, block.steps() * n * channels);
-        grow(&mut self.deltas, ((cut.segment + 1) * n + 1) * packed.delta_stride);
+        grow(&mut self.deltas, cut.deltas(packed, n));
         for scratch in [&mut self.targets, &mut self.terms, &mut self.squares, &mut self.precisions] {
             grow(scratch, cut.segment * n * packed.n_y);
         }

@@ -303,7 +303,11 @@ const LONG: Case = Case {
 fn any_number_of_threads_gives_the_same_bits() {
     let set = crate::engine::InstructionSet::best();
     // The second would be one block, were there not so much to do.
-    for case in [LONG, Case { lengths: &[700, 1500, 700, 64, 700], ..LONG }] {
+    // The others are one, which a second thread follows with the gradient of the weights, segment by segment.
+    let one = Case { lengths: &[4500, 2500, 4000], ..LONG };
+    for case in
+        [LONG, Case { lengths: &[700, 1500, 700, 64, 700], ..LONG }, one.clone(), Case { recompute: true, ..one }]
+    {
         let one = evaluate(&case, &Engine::new(1, set).unwrap());
         for threads in [2, 3, 4, 7] {
             assert!(evaluate(&case, &Engine::new(threads, set).unwrap()) == one, "{threads} threads");
@@ -362,10 +366,16 @@ fn every_instruction_set_gives_the_same_bits() {
 
 #[test]
 fn evaluations_of_other_runs_in_between_change_no_bit() {
+    // Of seven threads, three follow the four blocks of all runs.
+    [1, 7].into_iter().for_each(other_runs_in_between);
+}
+
+fn other_runs_in_between(threads: usize) {
+    let engine = Engine::new(threads, crate::engine::InstructionSet::best()).unwrap();
     let (point, (data, runs)) = (LONG.point(), LONG.data());
     let topology = &point.network.topology;
     let (n_c, values) = (topology.context_units(), point.states.values());
-    let mut objective = Engine::serial().objective(&Request::new(topology, &data)).unwrap();
+    let mut objective = engine.objective(&Request::new(topology, &data)).unwrap();
     objective.set_parameters(&point.network.parameters);
     let mut evaluate = |part: std::ops::Range<usize>, want| {
         let mut evaluation = Evaluation::new(topology);
