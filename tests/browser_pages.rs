@@ -13,6 +13,8 @@ use serde_json::{Value, json};
 
 #[path = "python/interpreter.rs"]
 mod interpreter;
+#[path = "sweeping/thousand.rs"]
+mod thousand;
 #[path = "../crates/run/tests/variants/mod.rs"]
 mod variants;
 
@@ -87,27 +89,40 @@ fn the_step_in_script_computes_what_the_library_computes_for_every_kind_of_netwo
 fn the_network_in_a_page_is_dragged_and_runs_as_the_program_lets_it_run() {
     let folder = tempfile::tempdir().unwrap();
     scrnn(folder.path(), "reproduce limit-cycle --epochs 20 --out cycle");
-    scrnn(folder.path(), "report cycle/seed-1");
-    let Some(found) = used(folder.path(), &["drag", "cycle/seed-1/report.html"]) else { return };
-    assert_ne!(found["start"], found["dragged"]);
-    assert_ne!(found["dragged"], found["keyed"]);
-    assert_eq!(found["changed"], json!([true, true, true]), "a drag, noise and a push change what is drawn");
-    let generated = scrnn(folder.path(), "generate cycle/seed-1 --no-noise --json");
-    let generated: Value = serde_json::from_str(&generated).unwrap();
-    let sequences = generated["sequences"].as_array().unwrap();
-    let runs = found["runs"].as_array().unwrap();
-    assert!(runs.len() == sequences.len() && runs.len() >= 3);
-    for (run, sequence) in runs.iter().zip(sequences) {
-        for part in ["mean", "variance"] {
-            let (own, library) = (run[part].as_array().unwrap(), sequence[part].as_array().unwrap());
-            assert!(own.len() >= 50);
-            for (step, (a, b)) in own.iter().zip(library).enumerate() {
-                for (a, b) in numbers(a).into_iter().zip(numbers(b)) {
-                    assert!((a - b).abs() <= 1e-6, "{part} at step {step}: {a} in the page, {b} in the library");
+    let sine = root().join("assets/experiments/sinusoid_fast.toml").display().to_string();
+    scrnn(folder.path(), &format!("train {sine} --epochs 20 --set data.sequences=1 --out one --quiet"));
+    scrnn(folder.path(), &format!("train {sine} --epochs 20 --set data.sequences=2 --out two --quiet"));
+    for (run, least) in [("cycle/seed-1", 3), ("one", 1), ("two", 2)] {
+        scrnn(folder.path(), &format!("report {run}"));
+        let Some(found) = used(folder.path(), &["drag", &format!("{run}/report.html")]) else { return };
+        assert_ne!(found["start"], found["dragged"], "{run}");
+        assert_ne!(found["dragged"], found["keyed"], "{run}");
+        assert_eq!(found["changed"], json!([true, true, true]), "{run}: a drag, noise and a push change what is drawn");
+        let generated = scrnn(folder.path(), &format!("generate {run} --no-noise --json"));
+        let generated: Value = serde_json::from_str(&generated).unwrap();
+        let sequences = generated["sequences"].as_array().unwrap();
+        let runs = found["runs"].as_array().unwrap();
+        assert!(runs.len() == sequences.len() && runs.len() >= least);
+        for (own, sequence) in runs.iter().zip(sequences) {
+            for part in ["mean", "variance"] {
+                let (own, library) = (own[part].as_array().unwrap(), sequence[part].as_array().unwrap());
+                assert!(own.len() >= 50);
+                for (step, (a, b)) in own.iter().zip(library).enumerate() {
+                    for (a, b) in numbers(a).into_iter().zip(numbers(b)) {
+                        assert!(
+                            (a - b).abs() <= 1e-6,
+                            "{run}, {part} at step {step}: {a} in the page, {b} in the library"
+                        );
+                    }
                 }
             }
         }
     }
+    scrnn(folder.path(), &format!("train {sine} --epochs 20 --set training.members=2 --out mixture --quiet"));
+    scrnn(folder.path(), "report mixture");
+    let Some(found) = used(folder.path(), &["drag", "mixture/report.html"]) else { return };
+    assert_eq!(found["changed"], json!([true, true, true]), "a mixture: {found}");
+    assert!(numbers(&found["runs"][0]["mean"][49]).iter().all(|mean| mean.is_finite()), "{found}");
 }
 
 #[test]
@@ -129,10 +144,86 @@ fn a_recording_is_played_to_its_end_and_its_hand_is_where_the_recording_has_it()
     assert_eq!((&found["turned"], &found["curves"]), (&json!(true), &json!(6)), "{found}");
 }
 
-/// A training that is ended when the test is over, however it ends.
-struct Training(std::process::Child);
+#[test]
+fn a_recording_of_ros_with_joint_states_alone_shows_the_hand_where_forward_kinematics_has_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let Some(python) = interpreter::python("playwright.sync_api, mcap_ros2.writer, numpy") else { return };
+    let script = root().join("tests/python/write_arm.py");
+    let output = Command::new(python).arg(script).arg(folder.path()).output().unwrap();
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    scrnn(folder.path(), "view arm.mcap --urdf arm.urdf --out arm.html");
+    let truth: Value = serde_json::from_slice(&std::fs::read(folder.path().join("hand.json")).unwrap()).unwrap();
+    let truth: Vec<&Value> = truth.as_array().unwrap().iter().step_by(7).collect();
+    let times: Vec<String> = truth.iter().map(|one| one["t"].to_string()).collect();
+    let mut arguments = vec!["poses", "arm.html", "hand"];
+    arguments.extend(times.iter().map(String::as_str));
+    let Some(found) = used(folder.path(), &arguments) else { return };
+    for (one, truth) in found["poses"].as_array().unwrap().iter().zip(&truth) {
+        let rows: Vec<Vec<f64>> = truth["pose"].as_array().unwrap().iter().map(numbers).collect();
+        let place = numbers(&one["place"]);
+        let [x, y, z, w] = [place[3], place[4], place[5], place[6]];
+        // The rotation of a unit quaternion.
+        let turned = [
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
+            [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
+            [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
+        ];
+        for (i, row) in rows.iter().enumerate() {
+            assert!((place[i] - row[3]).abs() < 1e-6, "at {}: {one}, needed {truth}", truth["t"]);
+            for k in 0..3 {
+                assert!((turned[i][k] - row[k]).abs() < 1e-6, "at {}: {turned:?}, needed {truth}", truth["t"]);
+            }
+        }
+        let (drawn, projected) = (numbers(&one["drawn"]["at"]), numbers(&one["projected"]));
+        let off = (drawn[0] - projected[0]).hypot(drawn[1] - projected[1]);
+        assert!(off <= 1.5, "{off} pixels at {}: {one}", truth["t"]);
+    }
+    assert!(found["poses"][0]["form"] == "box" && numbers(&found["poses"][0]["size"]) == [0.1, 0.06, 0.04], "{found}");
+    assert_eq!(found["curves"], 3, "the joints themselves");
+    let said = found["text"].as_str().unwrap();
+    assert!(said.contains("Nothing is recorded on /sensed") && said.contains("its root is at the origin"), "{said}");
+}
 
-impl Drop for Training {
+/// A command that is ended when the test is over, however it ends.
+struct Served(std::process::Child);
+
+impl Served {
+    /// Waits for its own end.
+    fn ends(mut self) {
+        assert!(self.0.wait().unwrap().success());
+    }
+}
+
+/// A command that serves a page, and where.
+fn served(folder: &Path, line: &str) -> (Served, String) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_scrnn"));
+    command.current_dir(folder).stderr(std::process::Stdio::piped()).stdout(std::process::Stdio::null());
+    let mut served = Served(command.args(line.split_whitespace()).spawn().unwrap());
+    let mut said = BufReader::new(served.0.stderr.take().unwrap());
+    let mut all = String::new();
+    let url = loop {
+        let before = all.len();
+        assert!(said.read_line(&mut all).unwrap() > 0, "{all}");
+        if let Some(url) = all[before..].trim().strip_prefix("watch it at ") {
+            break url.to_owned();
+        }
+    };
+    // Somebody has to read what it says.
+    std::thread::spawn(move || std::io::copy(&mut said, &mut std::io::sink()));
+    (served, url)
+}
+
+/// What is told to a page that names another host.
+fn refuses_other_hosts(url: &str, path: &str, secret: &str) {
+    let address = url.trim_start_matches("http://").trim_end_matches('/');
+    let mut stream = std::net::TcpStream::connect(address).unwrap();
+    stream.write_all(format!("GET /{path} HTTP/1.1\r\nHost: elsewhere.example\r\n\r\n").as_bytes()).unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    assert!(answer.starts_with("HTTP/1.1 403 ") && !answer.contains(secret), "{answer}");
+}
+
+impl Drop for Served {
     fn drop(&mut self) {
         let _ = self.0.kill();
         let _ = self.0.wait();
@@ -150,24 +241,9 @@ fn a_training_is_watched_live_and_learns_what_it_would_learn_unwatched() {
         ["plain", "watched"].map(|run| scrnn(folder.path(), &format!("generate {run} --seed 3 --json")));
     assert!(plain == watched, "the page changed what was learned");
 
-    let mut command = Command::new(env!("CARGO_BIN_EXE_scrnn"));
-    command.current_dir(folder.path()).stderr(std::process::Stdio::piped()).stdout(std::process::Stdio::null());
     let line = format!("train {experiment} --epochs 1000000 --out live --watch --set output.checkpoint_seconds=1");
-    let mut training = Training(command.args(line.split_whitespace()).spawn().unwrap());
-    let mut said = BufReader::new(training.0.stderr.take().unwrap());
-    let mut first = String::new();
-    said.read_line(&mut first).unwrap();
-    let url = first.trim().strip_prefix("watch it at ").unwrap_or_else(|| panic!("{first}")).to_owned();
-    // Somebody has to read what it says.
-    std::thread::spawn(move || std::io::copy(&mut said, &mut std::io::sink()));
-
-    let address = url.trim_start_matches("http://").trim_end_matches('/');
-    let mut stream = std::net::TcpStream::connect(address).unwrap();
-    stream.write_all(b"GET /data.json HTTP/1.1\r\nHost: elsewhere.example\r\n\r\n").unwrap();
-    let mut answer = String::new();
-    stream.read_to_string(&mut answer).unwrap();
-    assert!(answer.starts_with("HTTP/1.1 403 ") && !answer.contains("lissajous"), "{answer}");
-
+    let (_training, url) = served(folder.path(), &line);
+    refuses_other_hosts(&url, "data.json", "lissajous");
     let Some(found) = used(folder.path(), &["live", &url]) else { return };
     assert!(found["points"].as_f64().unwrap() > 2.0 && found["loops"].as_f64().unwrap() >= 2.0, "{found}");
     assert!(
@@ -175,4 +251,146 @@ fn a_training_is_watched_live_and_learns_what_it_would_learn_unwatched() {
     );
     assert!(found["lost"].as_str().unwrap().contains("does not answer"), "{found}");
     assert_eq!(found["foreign"], json!([]), "no request goes elsewhere");
+}
+
+/// A network that has seen a little of three short demonstrations of reaching.
+const REACH: &str = "name = \"reach\"\n[data]\ntask = \"reach\"\nsequences = 3\nsteps = 30\n[network]\n\
+                     initial_state_variance = 0.001\n[[network.groups]]\nname = \"c\"\nunits = 8\ntime_constant = 2.0\n\
+                     [training]\nepochs = 300\noptimiser = \"adam\"\n[training.adam]\nrate = 0.01\n";
+
+#[test]
+fn a_robot_is_watched_while_it_reaches_and_does_what_it_does_unwatched() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("reach.toml"), REACH).unwrap();
+    scrnn(folder.path(), "train reach.toml --out run --quiet");
+    let line = "simulate reach run --cycles 1 --seed 3 --json";
+    let plain = scrnn(folder.path(), line);
+    assert!(plain == scrnn(folder.path(), &format!("{line} --watch --speed 0")), "the page changed what was done");
+
+    let (served, url) = served(folder.path(), "simulate reach run --cycles 10000 --watch");
+    refuses_other_hosts(&url, "data/0.json", "HeadYaw");
+    let Some(found) = used(folder.path(), &["motion", &url]) else { return };
+    assert!(found["bodies"].as_f64().unwrap() > 10.0 && found["channels"] == 6, "{found}");
+    assert!(numbers(&found["curves"]).iter().all(|count| *count >= 2.0) && found["bands"] == 6, "{found}");
+    assert!(numbers(&found["errors"]).iter().all(|error| *error >= 0.0) && found["in_order"] == true, "{found}");
+    // The hand moves, and is drawn where the page was told that it is.
+    assert_ne!(found["hand"], found["later"], "{found}");
+    let (drawn, projected) = (numbers(&found["drawn"]["drawn"]["at"]), numbers(&found["drawn"]["projected"]));
+    let off = (projected[0] - drawn[0]).hypot(projected[1] - drawn[1]);
+    assert!(off <= 1.0, "{off} pixels: {found}");
+    assert!(found["lost"].as_f64().unwrap() > 0.0 && found["back"].as_str().unwrap().contains(" s, error "), "{found}");
+    assert_eq!(found["foreign"], json!([]), "no request goes elsewhere");
+    drop(served);
+}
+
+#[test]
+fn a_stream_is_watched_and_answered_as_it_is_unwatched() {
+    let folder = tempfile::tempdir().unwrap();
+    scrnn(folder.path(), "reproduce sinusoid --epochs 50 --out wave --quiet");
+    scrnn(folder.path(), "data sinusoid --sequences 1 --steps 300 --out new.csv");
+    let line = "recognize wave/seed-1 new.csv --online --window 20 --steps 2 --ahead 15";
+    let followed = |more: &str, out: &str| {
+        scrnn(folder.path(), &format!("{line}{more} --out {out}"));
+        std::fs::read(folder.path().join(out)).unwrap()
+    };
+    assert!(followed("", "a.csv") == followed(" --watch --speed 0", "b.csv"), "the page changed what was found");
+
+    let (served, url) = served(folder.path(), &format!("{line} --watch --speed 0.5"));
+    refuses_other_hosts(&url, "data/0.json", "frames");
+    let Some(found) = used(folder.path(), &["motion", &url]) else { return };
+    assert!(found["bodies"] == 0 && found["channels"] == 1 && found["look"] == 16, "{found}");
+    // Sensed, expected, to come, and what is now made of the past; a band for what was expected and one for what is to come.
+    assert!(numbers(&found["curves"])[0] >= 4.0 && found["bands"] == 2, "{found}");
+    assert!(found["back"].as_str().unwrap().starts_with("sample ") && found["in_order"] == true, "{found}");
+    assert_eq!(found["foreign"], json!([]), "no request goes elsewhere");
+    drop(served);
+}
+
+#[test]
+fn a_sweep_and_a_mixture_are_watched_until_all_are_done() {
+    let folder = tempfile::tempdir().unwrap();
+    let experiment = root().join("assets/experiments/sinusoid_fast.toml");
+    let sweep = format!(
+        "name = \"two\"\nexperiment = {experiment:?}\nseeds = 2\n[set]\ntraining.epochs = 1500\noutput.checkpoint_every = 50\n[grid]\n\
+         \"training.adam.rate\" = [1e-3, 1e-2]\n"
+    );
+    std::fs::write(folder.path().join("two.toml"), sweep).unwrap();
+    // Its own server would go with it: another one reads the same folder.
+    let (sweeping, own) = served(folder.path(), "sweep two.toml --out two --watch");
+    refuses_other_hosts(&own, "data/0.json", "seed-1");
+    let (_status, url) = served(folder.path(), "sweep two.toml --out two --status --watch");
+    let Some(found) = used(folder.path(), &["many", &url]) else { return };
+    sweeping.ends();
+    assert!(found["first"].as_str().unwrap().starts_with("Of 4 runs:"), "{found}");
+    assert_eq!(found["last"], "Of 4 runs: 4 finished.");
+    assert_eq!((&found["rows"], &found["curves"], &found["marked"]), (&json!(4), &json!(4), &json!(1)), "{found}");
+    assert!(found["key"].as_str().unwrap().contains("epoch 1500 of 1500"), "{found}");
+    assert_eq!(found["foreign"], json!([]), "no request goes elsewhere");
+
+    let line = format!("train {} --set training.members=2 --epochs 40000 --out mix --watch", experiment.display());
+    let (_training, url) = served(folder.path(), &line);
+    let address = url.trim_start_matches("http://").trim_end_matches('/');
+    let told = || -> Value {
+        let mut stream = std::net::TcpStream::connect(address).unwrap();
+        stream.write_all(format!("GET /data/0.json HTTP/1.1\r\nHost: {address}\r\n\r\n").as_bytes()).unwrap();
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        serde_json::from_str(answer.split("\r\n\r\n").nth(1).unwrap()).unwrap()
+    };
+    let begun = std::time::Instant::now();
+    let both = loop {
+        let told = told();
+        if told["counts"][1] == json!(["being trained", 2]) {
+            break told;
+        }
+        assert!(begun.elapsed().as_secs() < 60, "{told}");
+        std::thread::sleep(std::time::Duration::from_millis(200));
+    };
+    let names: Vec<&Value> = both["changed"].as_array().unwrap().iter().map(|one| &one["name"]).collect();
+    assert_eq!(names, ["member 1", "member 2"], "{both}");
+    assert_eq!(both["changed"][0]["epochs"], 40000, "{both}");
+}
+
+#[test]
+fn the_page_of_a_comparison_reads_well_on_a_phone_in_print_in_dark_and_light_also_with_a_thousand_networks() {
+    let folder = tempfile::tempdir().unwrap();
+    let experiment = root().join("assets/experiments/sinusoid_fast.toml");
+    let sweep = format!(
+        "name = \"two\"\nexperiment = {experiment:?}\nseeds = 3\n[set]\ntraining.epochs = 20\n[grid]\n\"training.adam.rate\" = [1e-3, 1e-2]\n\
+         \"network.groups.context.units\" = [3, 4, 5]\n"
+    );
+    std::fs::write(folder.path().join("two.toml"), sweep).unwrap();
+    scrnn(folder.path(), "sweep two.toml --out two --quiet");
+    scrnn(folder.path(), "compare two");
+    let text = std::fs::read_to_string(&experiment).unwrap();
+    std::fs::write(folder.path().join("sine.toml"), format!("{text}\n").replace("epochs = 25_000", "epochs = 200"))
+        .unwrap();
+    thousand::make(folder.path(), &|line| scrnn(folder.path(), line));
+    scrnn(folder.path(), "compare runs/s");
+    for (place, least) in [("two", 200), ("runs/s", 1000)] {
+        let page = format!("{place}/report.html");
+        let size = std::fs::metadata(folder.path().join(&page)).unwrap().len();
+        assert!(size < 5_000_000, "{page}: {size} bytes");
+        // No request leaves the page: else the script fails.
+        let Some(found) = used(folder.path(), &["read", &page]) else { return };
+        for way in ["light", "dark", "print"] {
+            let found = &found[way];
+            assert_eq!(found["wide"], 0, "{page}, {way}: wider than 390 pixels: {found}");
+            assert!(found["texts"].as_u64().unwrap() > least, "{page}, {way}: {found}");
+            assert!(found["faintest"]["contrast"].as_f64().unwrap() >= 4.5, "{page}, {way}: {found}");
+            let verdict = &found["verdict"];
+            assert!(verdict["text"].as_str().unwrap().starts_with("Over all seeds the best setting is"), "{verdict}");
+            let [left, right, top] = ["left", "right", "top"].map(|side| verdict[side].as_f64().unwrap());
+            assert!(
+                verdict["seen"] == true && left >= 0.0 && right <= 390.0 && top < 800.0,
+                "{page}, {way}: {verdict}"
+            );
+            let milliseconds = found["milliseconds"].as_f64().unwrap();
+            assert!(milliseconds < 2_000.0, "{page}, {way}: {milliseconds} ms to open");
+            eprintln!(
+                "{page}, {way}: {size} bytes, {milliseconds:.0} ms, least contrast {}",
+                found["faintest"]["contrast"]
+            );
+        }
+    }
 }

@@ -22,6 +22,8 @@ mod numbers;
 mod numbers_table;
 #[path = "cli/own_data.rs"]
 mod own_data;
+#[path = "cli/progress.rs"]
+mod progress;
 #[path = "cli/reaching.rs"]
 mod reaching;
 #[path = "cli/recordings.rs"]

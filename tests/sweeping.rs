@@ -8,6 +8,8 @@
 mod cluster;
 #[path = "sweeping/comparing.rs"]
 mod comparing;
+#[path = "sweeping/thousand.rs"]
+mod thousand;
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -131,7 +131,7 @@ fn an_interrupted_reproduction_leaves_no_page_and_goes_on() {
     assert_eq!(without_times(metrics(&place, "cut")), without_times(metrics(&place, "whole")));
 }
 
-/// How many threads of a command worked: those that were seen twice and neither wait for signals nor write messages.
+/// How many threads of a command worked: those that were seen twice and neither wait for signals nor write messages or progress.
 #[cfg(target_os = "linux")]
 fn workers(place: &Place, line: &str) -> usize {
     let mut command = Command::new(env!("CARGO_BIN_EXE_scrnn"));
@@ -144,7 +144,7 @@ fn workers(place: &Place, line: &str) -> usize {
         for task in std::fs::read_dir(&tasks).into_iter().flatten().flatten() {
             // A thread gets its name once it runs: the first look may be too early.
             let name = std::fs::read_to_string(task.path().join("comm")).unwrap_or_default();
-            if !["signals", "stderr", ""].contains(&name.trim_end()) {
+            if !["signals", "stderr", "progress", ""].contains(&name.trim_end()) {
                 *seen.entry(task.file_name()).or_insert(0) += 1;
             }
         }

@@ -4,6 +4,10 @@
     use_page.py drag PAGE                   drags the initial state, then runs every learned state without noise
     use_page.py live URL                    watches a training: what is drawn, and who is answered
     use_page.py view PAGE RECORDING BODY    plays the page to its end; where the body is drawn, and where the recording has it
+    use_page.py poses PAGE BODY TIME...     where a body is at these times, in the world and on the canvas
+    use_page.py motion URL                  watches a robot or a stream: what is drawn, and whether a lost connection comes back
+    use_page.py many URL                    watches many trainings until all are over
+    use_page.py read PAGE                   the page at 390 pixels, light, dark and printed: what is too wide, hidden or hard to read
 
 The browser is found as look_at_page.py finds it; without one the code is 3. A request, an error or a word on the console ends with 1.
 """
@@ -133,6 +137,18 @@ def view(browser, file, recording, body, problems):
     }
 
 
+def poses(browser, file, body, times, problems):
+    page = opened(browser, file, problems)
+    one = """([body, time]) => {
+        const found = scrnnView.bodies.find((one) => one.name === body);
+        scrnnView.go(time);
+        const place = scrnnView.placeOf(found, time);
+        return { place, form: found.form, size: found.size, drawn: scrnnView.measure(body), projected: scrnnView.project(place.slice(0, 3)) };
+    }"""
+    found = [page.evaluate(one, [body, float(time)]) for time in times]
+    return {"poses": found, "curves": page.locator("#view .signals svg").count(), "text": page.locator("main").inner_text()}
+
+
 def live(browser, url, problems):
     page = browser.new_page()
     asked = []
@@ -156,6 +172,118 @@ def live(browser, url, problems):
     }
 
 
+def watched(browser, url, problems):
+    """A page from a server, with all that it asks for."""
+    page = browser.new_page(viewport={"width": 1000, "height": 900})
+    asked = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.on("pageerror", lambda error: problems.append(f"error: {error}"))
+    page.goto(url)
+    return page, lambda: [one for one in asked if not one.startswith(url) and not one.startswith("data:")]
+
+
+def motion(browser, url, problems):
+    page, foreign = watched(browser, url, problems)
+    stand = lambda: page.locator("#motion .stand").inner_text()
+    # Two samples with what was expected of them.
+    wait(page, "scrnnMotion.state.frames.filter(one => one.s && one.m).length >= 3 && document.querySelectorAll('#motion .error .off').length > 0")
+    robot = page.evaluate("scrnnMotion.state.bodies.length")
+    found = {"bodies": robot, "first": stand(), "channels": page.locator("#motion .signals svg").count()}
+    found["curves"] = page.evaluate("[...document.querySelectorAll('#motion .signals svg')].map(one => one.querySelectorAll('polyline').length)")
+    found["look"] = page.evaluate("(scrnnMotion.state.look || {forecast: []}).forecast.length")
+    found["bands"] = page.locator("#motion .signals .band").count()
+    found["errors"] = page.evaluate("scrnnMotion.state.frames.filter(one => one.e !== undefined).map(one => one.e)")
+    if robot:
+        place = """() => {
+            const state = scrnnMotion.state, k = state.bodies.findIndex((one) => one.name === "self/r_hand" && one.form === "sphere");
+            return scrnnMotion.placed(k, state.frames.findLast((one) => one.places).t);
+        }"""
+        found["hand"] = page.evaluate(place)
+        found["drawn"] = page.evaluate("""() => { const state = scrnnMotion.state; state.held = true;
+            const k = state.bodies.findIndex((one) => one.name === "self/r_hand" && one.form === "sphere"), body = state.bodies[k], name = body.name;
+            body.name = "measured";
+            const drawn = scrnnMotion.measure("measured"), place = scrnnMotion.placed(k, state.shown);
+            body.name = name;
+            state.held = false;
+            return { drawn, projected: scrnnMotion.project(place.slice(0, 3)) }; }""")
+        newest = "scrnnMotion.state.frames[scrnnMotion.state.frames.length - 1].t"
+        wait(page, f"{newest} > {page.evaluate(newest) + 1.5}")
+        found["later"] = page.evaluate(place)
+    # The connection is lost, and comes back.
+    page.context.set_offline(True)
+    wait(page, "scrnnMotion.state.failed > 0 && document.querySelector('#motion .stand').textContent.includes('no answer') || scrnnMotion.state.finished")
+    found["lost"] = page.evaluate("scrnnMotion.state.failed")
+    page.context.set_offline(False)
+    polls = page.evaluate("scrnnMotion.state.polls")
+    wait(page, f"scrnnMotion.state.polls > {polls}")
+    wait(page, "!document.querySelector('#motion .stand').textContent.includes('no answer')")
+    times = page.evaluate("scrnnMotion.state.frames.map(one => one.t)")
+    found.update({"back": stand(), "in_order": times == sorted(times), "frames": len(times), "foreign": foreign()})
+    return found
+
+
+def many(browser, url, problems):
+    page, foreign = watched(browser, url, problems)
+    wait(page, "scrnnMany.runs.length > 0 && document.querySelectorAll('#many .runs tr').length === scrnnMany.runs.length")
+    first = page.locator("#many .stand").inner_text()
+    wait(page, "scrnnMany.runs.filter(one => one.curve.length > 1).length > 0")
+    wait(page, "scrnnMany.over")
+    page.locator("#many .runs tr").first.hover()
+    return {
+        "first": first, "last": page.locator("#many .stand").inner_text(), "rows": page.locator("#many .runs tr").count(),
+        "curves": page.locator("#many polyline.curve:not(.held)").count(), "marked": page.locator("#many .marked").count(),
+        "key": page.locator("#many .key").inner_text(), "foreign": foreign(),
+    }
+
+
+# Texts that can be seen, each with its contrast against what lies behind it (WCAG 2).
+READ = """() => {
+    const numbers = (colour) => (colour.match(/[\\d.]+/g) || []).map(Number);
+    const light = ([r, g, b]) => [r, g, b].map((c) => (c /= 255) <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4).reduce((sum, c, k) => sum + c * [0.2126, 0.7152, 0.0722][k], 0);
+    const behind = (node) => {
+        for (; node; node = node.parentElement) {
+            const colour = numbers(getComputedStyle(node).backgroundColor);
+            if (colour.length === 3 || colour[3] > 0.99) return colour;
+        }
+        return [255, 255, 255];
+    };
+    const contrast = (a, b) => { const [low, high] = [light(a), light(b)].sort((x, y) => x - y); return (high + 0.05) / (low + 0.05); };
+    const texts = [];
+    for (const node of document.querySelectorAll("h1, h2, p, a, td, th, caption, figcaption, figcaption b, .thesis, .files, pre, svg text")) {
+        if (!node.textContent.trim() || !node.getClientRects().length) continue;
+        const style = getComputedStyle(node), svg = node.namespaceURI.endsWith("svg");
+        texts.push({ tag: node.tagName.toLowerCase(), text: node.textContent.trim().slice(0, 40), contrast: contrast(numbers(svg ? style.fill : style.color), behind(node)) });
+    }
+    texts.sort((a, b) => a.contrast - b.contrast);
+    const verdict = document.querySelector(".verdict"), box = verdict && verdict.getBoundingClientRect();
+    return {
+        wide: document.documentElement.scrollWidth - window.innerWidth,
+        texts: texts.length, faintest: texts[0],
+        verdict: verdict && { text: verdict.textContent, left: box.left, right: box.right, top: box.top + scrollY, height: box.height, seen: verdict.checkVisibility() },
+    };
+}"""
+
+
+def read(browser, file, problems):
+    found = {}
+    for name, scheme, media in [("light", "light", "screen"), ("dark", "dark", "screen"), ("print", "light", "print")]:
+        context = browser.new_context(viewport={"width": 390, "height": 800}, color_scheme=scheme)
+        page = context.new_page()
+        url = file.resolve().as_uri()
+        page.on("request", lambda request: None if request.url == url or request.url.startswith("data:") else problems.append(request.url))
+        page.on("console", lambda message: problems.append(f"console: {message.text}"))
+        page.on("pageerror", lambda error: problems.append(f"error: {error}"))
+        page.emulate_media(media=media, color_scheme=scheme)
+        page.goto(url)
+        found[name] = page.evaluate(READ)
+        # Until all is laid out and drawn, by the browser's own clock.
+        timing = "() => { const [one] = performance.getEntriesByType('navigation'), paint = performance.getEntriesByName('first-contentful-paint')[0]; return [one.loadEventEnd, paint ? paint.startTime : one.loadEventEnd]; }"
+        wait(page, "performance.getEntriesByType('navigation')[0].loadEventEnd > 0")
+        found[name]["milliseconds"] = max(page.evaluate(timing))
+        context.close()
+    return found
+
+
 def main():
     problems = []
     with sync_playwright() as playwright:
@@ -166,6 +294,14 @@ def main():
             result = drag(browser, pathlib.Path(sys.argv[2]), problems)
         elif sys.argv[1] == "live":
             result = live(browser, sys.argv[2], problems)
+        elif sys.argv[1] == "poses":
+            result = poses(browser, pathlib.Path(sys.argv[2]), sys.argv[3], sys.argv[4:], problems)
+        elif sys.argv[1] == "motion":
+            result = motion(browser, sys.argv[2], problems)
+        elif sys.argv[1] == "many":
+            result = many(browser, sys.argv[2], problems)
+        elif sys.argv[1] == "read":
+            result = read(browser, pathlib.Path(sys.argv[2]), problems)
         else:
             result = view(browser, pathlib.Path(sys.argv[2]), sys.argv[3], sys.argv[4], problems)
         browser.close()

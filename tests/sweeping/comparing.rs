@@ -3,7 +3,7 @@
 use std::fs;
 use std::time::{Duration, Instant};
 
-use crate::{Place, SINE};
+use crate::{Place, SINE, thousand};
 
 fn sine(epochs: u32) -> String {
     SINE.replace("epochs = 1500", &format!("epochs = {epochs}"))
@@ -55,27 +55,8 @@ fn one_knob_is_a_curve_two_are_a_heat_map_and_the_best_is_named_over_all_seeds()
 
 #[test]
 fn a_page_of_a_thousand_networks_is_small_and_made_in_no_time() {
-    let sweep =
-        "seeds = 10\n[grid]\n\"training.adam.rate\" = { from = 1e-4, to = 1e-1, count = 100, scale = \"log\" }\n";
-    let place = Place::new(&sine(200), sweep);
-    let plan = place.ends(0, "sweep s.toml --dry-run --json").0;
-    fs::create_dir_all(place.path("runs/s")).unwrap();
-    fs::write(place.path("runs/s/plan.json"), plan).unwrap();
-    // One network stands for all: what a page shows does not depend on how long they learned.
-    place.ends(0, "train sine.toml --out one --quiet");
-    for (k, run) in place.runs("runs/s").iter().enumerate() {
-        let folder = place.path("runs/s").join(run);
-        fs::create_dir_all(&folder).unwrap();
-        for name in ["checkpoint.safetensors", "history.csv"] {
-            fs::copy(place.path("one").join(name), folder.join(name)).unwrap();
-        }
-        fs::write(folder.join("report.html"), "").unwrap();
-        let value = (k * 7919 % 1000) as f64 / 1000.0;
-        let text = format!(
-            "{{\"format\":1,\"outcome\":\"finished\",\"decided_by\":\"\",\"measures\":{{\"nll\":{value},\"mse\":{value},\"best.nll\":{value},\"epoch\":200}}}}"
-        );
-        fs::write(folder.join("outcome.json"), text).unwrap();
-    }
+    let place = Place::new(&sine(200), "");
+    thousand::make(place.0.path(), &|line| place.ends(0, line).0);
     let begun = Instant::now();
     place.ends(0, "compare runs/s");
     let taken = begun.elapsed();

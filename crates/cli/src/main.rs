@@ -7,6 +7,7 @@ mod output;
 mod outputs;
 mod progress;
 mod signals;
+mod watching;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;

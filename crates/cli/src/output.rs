@@ -10,7 +10,7 @@ use std::io::{self, IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Condvar, LazyLock, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use miette::{GraphicalReportHandler, GraphicalTheme};
 use serde::Serialize;
@@ -93,6 +93,14 @@ pub fn say(message: impl Display) {
     tell(escaped(&line).into_owned());
 }
 
+/// When something was said last, or this was asked for first.
+static LAST_SAID: LazyLock<Mutex<Instant>> = LazyLock::new(|| Mutex::new(Instant::now()));
+
+/// For how long nothing has been said.
+pub fn silence() -> Duration {
+    LAST_SAID.lock().unwrap_or_else(PoisonError::into_inner).elapsed()
+}
+
 /// Messages that may wait; more are dropped.
 const MOST_WAITING: usize = 1000;
 /// For so long a message is waited for, so that it stands before what comes after it. Who reads so slowly once is no longer
@@ -129,6 +137,7 @@ fn count(waiting: &Mutex<usize>) -> MutexGuard<'_, usize> {
 }
 
 fn tell(message: String) {
+    *LAST_SAID.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
     let Some(teller) = &*TELLER else {
         let _ = io::stderr().lock().write_all(message.as_bytes());
         return;

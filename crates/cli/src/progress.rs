@@ -1,18 +1,20 @@
 //! How training is coming along: a bar on a terminal, a line every few seconds elsewhere. All of it on stderr.
 
 use std::io::IsTerminal;
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use scrnn::learning::EpochReport;
 use scrnn_report::in_words;
 use scrnn_run::held_out::Glance;
-use scrnn_run::messages;
+use scrnn_run::messages::{self, Messages};
 
 use crate::output;
 
 /// Between two lines off a terminal.
-const BETWEEN_LINES: Duration = Duration::from_secs(5);
+const BETWEEN_LINES: Duration = Duration::from_secs(2);
 /// Beyond this nobody waits.
 const LONGEST: Duration = Duration::from_secs(1000 * 365 * 86400);
 /// Between two updates of the bar.
@@ -44,28 +46,110 @@ impl Bars {
     }
 }
 
-/// Something that takes a while and knows no epochs: on a terminal, what it is and for how long, until this is dropped.
+/// Something that takes a while and knows no epochs, until this is dropped: on a terminal, what it is and for how long; elsewhere a line
+/// whenever nothing was said for two seconds.
 #[derive(Debug)]
-pub struct Busy(Option<ProgressBar>);
+pub struct Busy {
+    what: Arc<Mutex<String>>,
+    bar: Option<ProgressBar>,
+    /// Ends the thread of the lines when it is dropped.
+    _lines: Option<Sender<()>>,
+}
 
 impl Busy {
     /// From now on; `what` is the beginning of a sentence, e.g. "making the data".
     pub fn with(what: &str, quiet: bool) -> Self {
-        if quiet || !std::io::stderr().is_terminal() {
-            return Self(None);
+        Self::beside(what, quiet, None)
+    }
+
+    fn beside(what: &str, quiet: bool, others: Option<&MultiProgress>) -> Self {
+        let what = Arc::new(Mutex::new(what.to_owned()));
+        if quiet {
+            return Self { what, bar: None, _lines: None };
+        }
+        if !std::io::stderr().is_terminal() {
+            let lines = lines(Arc::clone(&what));
+            return Self { what, bar: None, _lines: lines };
         }
         let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed}")
             .unwrap_or_else(|_| ProgressStyle::default_spinner());
-        let bar = ProgressBar::new_spinner().with_style(style).with_message(what.to_owned());
+        let bar = ProgressBar::new_spinner().with_style(style);
+        let bar = others.map_or_else(|| bar.clone(), |others| others.add(bar.clone()));
+        bar.set_message(what.lock().unwrap_or_else(PoisonError::into_inner).clone());
         bar.enable_steady_tick(BETWEEN_UPDATES);
-        Self(Some(bar))
+        Self { what, bar: Some(bar), _lines: None }
+    }
+
+    /// It is at something else now.
+    fn at(&self, what: &str) {
+        what.clone_into(&mut self.what.lock().unwrap_or_else(PoisonError::into_inner));
+        if let Some(bar) = &self.bar {
+            bar.set_message(output::escaped(what).into_owned());
+        }
     }
 }
 
 impl Drop for Busy {
     fn drop(&mut self) {
-        if let Some(bar) = &self.0 {
+        if let Some(bar) = &self.bar {
             bar.finish_and_clear();
+        }
+    }
+}
+
+/// Says what goes on, and for how long, whenever all else is silent. Without the thread nothing is said.
+fn lines(what: Arc<Mutex<String>>) -> Option<Sender<()>> {
+    let (until, over) = channel::<()>();
+    let begun = Instant::now();
+    let say = move || {
+        loop {
+            let silent = output::silence().min(begun.elapsed());
+            let left = BETWEEN_LINES.saturating_sub(silent);
+            if left.is_zero() {
+                let what = what.lock().unwrap_or_else(PoisonError::into_inner).clone();
+                output::say(format_args!("{what}, {}", in_words(begun.elapsed())));
+            }
+            match over.recv_timeout(left.max(BETWEEN_UPDATES)) {
+                Err(RecvTimeoutError::Timeout) => {}
+                _ => return,
+            }
+        }
+    };
+    std::thread::Builder::new().name("progress".to_owned()).spawn(say).ok()?;
+    Some(until)
+}
+
+/// A long command with trainings and with work that knows no epochs: it is never silent for long.
+#[derive(Debug)]
+pub struct Work {
+    bars: Bars,
+    busy: Busy,
+}
+
+impl Work {
+    /// It begins; `what` is as in [`Busy::with`].
+    pub fn begin(what: &str, quiet: bool) -> Self {
+        let bars = Bars::new(quiet);
+        let busy = Busy::beside(what, quiet, Some(&bars.all));
+        Self { bars, busy }
+    }
+
+    /// As [`Bars::bar`].
+    pub fn bar(&self, label: &str, total: u64) -> Box<dyn messages::Progress> {
+        self.bars.bar(label, total)
+    }
+}
+
+impl Messages for Work {
+    fn say(&self, message: &str) {
+        if self.bars.quiet {
+            return;
+        }
+        self.busy.at(message.lines().next_back().unwrap_or(message));
+        match &self.busy.bar {
+            // Above the bars, not through them.
+            Some(bar) => bar.println(output::escaped(message)),
+            None => output::say(message),
         }
     }
 }
@@ -125,6 +209,24 @@ impl messages::Progress for Progress {
     fn held_out(&mut self, glance: &Glance) {
         let value = glance.one_step.nll.map_or(format!("{:.3e}", glance.one_step.mse), |nll| format!("{nll:.4}"));
         self.held_out = Some(format!("{value}, alone {:.3} off", glance.closed_loop.distance));
+    }
+
+    fn trying(&mut self, what: &str, epoch: u64, epochs: u64) {
+        match &self.display {
+            Display::Quiet => {}
+            Display::Lines if self.shown.elapsed() < BETWEEN_LINES => {}
+            Display::Lines => {
+                self.shown = Instant::now();
+                output::say(format_args!("{}{what}: epoch {epoch}/{epochs}", self.label));
+            }
+            Display::Bar(bar) if epoch == epochs || self.shown.elapsed() >= BETWEEN_UPDATES => {
+                self.shown = Instant::now();
+                bar.set_length(epochs);
+                bar.set_position(epoch);
+                bar.set_message(what.to_owned());
+            }
+            Display::Bar(_) => {}
+        }
     }
 
     /// Shows where training stands, if it is time to.

@@ -139,7 +139,7 @@ impl Suspicion {
             Self::MoreChannels { .. } => "save the array with steps first, or say `axes`".to_owned(),
             Self::DegreesAndRadians { .. } => "bring all files to one unit".to_owned(),
             Self::Staircase { channel, every } => format!(
-                "take every {every}th sample (a `period` {every} times as long), or record `{channel}` as often as it is measured"
+                "take every {every}th sample (where times are known: a `period` {every} times as long), or record `{channel}` as often as it is measured"
             ),
         })
     }

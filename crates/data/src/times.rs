@@ -55,7 +55,8 @@ pub fn to_even_steps(path: &str, samples: &mut Samples, selection: &Selection) -
     let wanted = selection.period_in_nanoseconds().and_then(|period| i64::try_from(period).ok());
     let resolution = samples.resolution;
     let mut middles = Vec::new();
-    for track in &mut samples.tracks {
+    for index in 0..samples.tracks.len() {
+        let track = &mut samples.tracks[index];
         let Some(middle) = middle_interval(&track.times) else { continue };
         let irregularity = irregularity(track, middle, resolution);
         if irregularity.as_ref().is_some_and(|irregularity| !irregularity.wavers) {
@@ -74,7 +75,8 @@ pub fn to_even_steps(path: &str, samples: &mut Samples, selection: &Selection) -
                 samples.remarks.push(Remark::Uneven { found: format!("sequence {}: {found}", track.name) });
             }
             (_, Some(Irregularity { found, wavers: false })) => {
-                return Err(refused(&track.name, found, Some(help(middle))));
+                let sequence = track.name.clone();
+                return Err(refused(&sequence, found, Some(help(middle, &samples.tracks))));
             }
             _ => {}
         }
@@ -98,20 +100,29 @@ pub fn to_even_steps(path: &str, samples: &mut Samples, selection: &Selection) -
         let found =
             format!("samples of {first} are {} s apart, those of {other} {} s", seconds(middle), seconds(*differs));
         if !selection.ignores_time() {
-            return Err(refused(other, found, Some(help(middle.min(*differs)))));
+            return Err(refused(other, found, Some(help(middle.min(*differs), &samples.tracks))));
         }
         samples.remarks.push(Remark::Uneven { found });
     }
     Ok(mean_interval(&samples.tracks).or((middle > 0).then_some(middle as f64 / 1e9)))
 }
 
-fn help(middle: i64) -> String {
+/// What can be done about uneven times. A period is named only where it is not refused in turn.
+fn help(middle: i64, tracks: &[Track]) -> String {
     // Three digits of a jittering clock are enough, as long as they say the same.
     let digits = (middle.max(1) as f64).log10().floor() as i32 - 2;
     let unit = 10_i128.pow(digits.clamp(0, 16) as u32);
     let rounded = i64::try_from((i128::from(middle) + unit / 2) / unit * unit).unwrap_or(middle);
-    let period = seconds(if off(rounded, middle) < 0.01 { rounded.max(1) } else { middle.max(1) });
-    format!("`period = {period}` brings them to even times; `time = \"rows\"` takes them as even steps all the same")
+    let period = if off(rounded, middle) < 0.01 { rounded.max(1) } else { middle.max(1) };
+    if tracks.iter().all(|track| against(track, period).is_none()) {
+        let period = seconds(period);
+        return format!(
+            "`period = {period}` brings them to even times; `time = \"rows\"` takes them as even steps all the same"
+        );
+    }
+    "cut it there into several files, or in a table into sequences by a column `sequence` that changes there; `time = \"rows\"` takes \
+     them as even steps all the same"
+        .to_owned()
 }
 
 /// How far an interval is off, as a share of the middle one.
@@ -197,34 +208,13 @@ fn gaps(track: &Track, middle: i64) -> Vec<Gap> {
 /// # Errors
 /// What stands against it, as a sentence.
 pub fn resampled(track: &Track, channels: usize, period: i64) -> Result<Vec<f64>, String> {
+    if let Some(found) = against(track, period) {
+        return Err(found);
+    }
     let times = &track.times;
     let (Some(&first), Some(&last)) = (times.first(), times.last()) else { return Ok(Vec::new()) };
-    if let Some(at) = times.windows(2).position(|pair| pair[1] < pair[0]) {
-        return Err(format!(
-            "the time falls from {} s to {} s after step {}",
-            since(track, at),
-            since(track, at + 1),
-            at + 1
-        ));
-    }
     let wide = |time: i64| i128::from(time);
-    let middle = middle_interval(times).unwrap_or(period);
-    let widest = WIDEST_GAP * wide(middle.max(period));
-    if let Some(at) = times.windows(2).position(|pair| wide(pair[1]) - wide(pair[0]) > widest) {
-        return Err(format!(
-            "no sample stands between {} s and {} s, which is too long to be bridged",
-            since(track, at),
-            since(track, at + 1)
-        ));
-    }
     let samples = (wide(last) - wide(first)) / wide(period) + 1;
-    if samples > MOST_PER_SAMPLE * times.len() as i128 {
-        return Err(format!(
-            "{} samples would become {samples}; needed: at most {}",
-            times.len(),
-            MOST_PER_SAMPLE * times.len() as i128
-        ));
-    }
     let mut at_even_times = Vec::with_capacity(usize::try_from(samples).unwrap_or(0).saturating_mul(channels));
     let mut after = 0;
     for k in 0..samples {
@@ -242,6 +232,39 @@ pub fn resampled(track: &Track, channels: usize, period: i64) -> Result<Vec<f64>
         }
     }
     Ok(at_even_times)
+}
+
+/// What stands against bringing a track to a period, as a sentence.
+fn against(track: &Track, period: i64) -> Option<String> {
+    let times = &track.times;
+    let (Some(&first), Some(&last)) = (times.first(), times.last()) else { return None };
+    if let Some(at) = times.windows(2).position(|pair| pair[1] < pair[0]) {
+        return Some(format!(
+            "the time falls from {} s to {} s after step {}",
+            since(track, at),
+            since(track, at + 1),
+            at + 1
+        ));
+    }
+    let wide = |time: i64| i128::from(time);
+    let middle = middle_interval(times).unwrap_or(period);
+    let widest = WIDEST_GAP * wide(middle.max(period));
+    if let Some(at) = times.windows(2).position(|pair| wide(pair[1]) - wide(pair[0]) > widest) {
+        return Some(format!(
+            "no sample stands between {} s and {} s, which is too long to be bridged",
+            since(track, at),
+            since(track, at + 1)
+        ));
+    }
+    let samples = (wide(last) - wide(first)) / wide(period) + 1;
+    if samples > MOST_PER_SAMPLE * times.len() as i128 {
+        return Some(format!(
+            "{} samples would become {samples}; needed: at most {}",
+            times.len(),
+            MOST_PER_SAMPLE * times.len() as i128
+        ));
+    }
+    None
 }
 
 /// The median of the intervals.

@@ -9,7 +9,7 @@ use scrnn_run::members;
 use scrnn_run::notes::Score;
 use scrnn_run::trained::Trained;
 
-use crate::{held_out, learning_curves};
+use crate::{held_out, learning_curves, playground};
 
 /// The page about the mixture of these networks; `rows` of the history of each.
 ///
@@ -25,6 +25,10 @@ pub fn page(all: &[Trained], rows: &[Vec<Row>], engine: &Engine) -> Result<Page>
     let notes = all.first().and_then(|one| one.notes.as_ref());
     let experiment: Option<Experiment> = notes.and_then(|notes| serde_json::from_value(notes.experiment.clone()).ok());
     let mut name = "a mixture".to_owned();
+    // Data that are gone are no reason to show nothing of the networks.
+    if let Some(Ok(source)) = all.first().map(|first| first.source(engine.threads())) {
+        sections.extend(playground::section(all, &source));
+    }
     if let Some(experiment) = &experiment {
         name.clone_from(&experiment.name);
         if let Some(judgement) = members::judge(all, experiment, engine)? {
@@ -35,7 +39,7 @@ pub fn page(all: &[Trained], rows: &[Vec<Row>], engine: &Engine) -> Result<Page>
     }
     let lede = format!(
         "A mixture of {} networks: its density is the mean of theirs. `scrnn report` of a member's folder draws what that network \
-         does, and has it in the page to play with.",
+         does.",
         all.len()
     );
     Ok(Page { title: format!("Run: {name}"), lede, sections })

@@ -273,6 +273,14 @@ impl Following {
         self.predicts().then(|| self.regression.mean().iter().enumerate().map(raw).collect())
     }
 
+    /// The variance of the next sample; none before enough samples came, and none without variance units.
+    pub fn next_variance(&self) -> Option<Vec<f64>> {
+        let scaling = &self.trained.checkpoint.scaling;
+        let raw = |(i, v): (usize, &f64)| scaling.variance_to_raw(i, *v);
+        let known = self.predicts() && self.trained.checkpoint.topology.has_variance();
+        known.then(|| self.regression.variance().iter().enumerate().map(raw).collect())
+    }
+
     /// What the network makes of the window and of what is to come.
     pub fn view(&self) -> View {
         let scaling = &self.trained.checkpoint.scaling;
@@ -351,7 +359,20 @@ impl Following {
 ///
 /// # Errors
 /// As [`Following::observe`].
-pub fn follow(mut session: Following, sequence: &Sequence, views: &[usize]) -> Result<Followed> {
+pub fn follow(session: Following, sequence: &Sequence, views: &[usize]) -> Result<Followed> {
+    follow_watched(session, sequence, views, &mut |_, _, _| ())
+}
+
+/// As [`follow`]; `watch` sees each sample with what became of it.
+///
+/// # Errors
+/// As [`Following::observe`].
+pub fn follow_watched(
+    mut session: Following,
+    sequence: &Sequence,
+    views: &[usize],
+    watch: &mut dyn FnMut(&Following, &[f64], &Regression),
+) -> Result<Followed> {
     let trained = session.trained.clone();
     let (scaling, delay) = (&trained.checkpoint.scaling, trained.checkpoint.topology.delay());
     let (mut steps, mut rows) = (Vec::with_capacity(sequence.len()), Rows::default());
@@ -370,6 +391,7 @@ pub fn follow(mut session: Following, sequence: &Sequence, views: &[usize]) -> R
             rows.variance.extend(v.map(|(i, &v)| scaling.variance_to_raw(i, v)));
         }
         let done = session.observe(sample)?;
+        watch(&session, sample, &done);
         if k >= delay {
             let last = session.regression.window() - 1;
             let smoothed = session.regression.smoothed_mean(last).into_iter().flatten().enumerate();

@@ -33,6 +33,11 @@ pub fn folder(path: &Path, k: usize) -> PathBuf {
     path.join(format!("member-{k}"))
 }
 
+/// What goes before what is shown of member `k`, from 1.
+pub fn label(k: usize) -> String {
+    format!("member {k}: ")
+}
+
 /// The folders of all members of the run at `path`; none if it is the run of a single network.
 pub fn folders(path: &Path) -> Vec<PathBuf> {
     if path.join(CHECKPOINT).exists() {
@@ -134,10 +139,14 @@ pub fn train_members(
     // What a recipe leaves open is found out once, for all of them.
     let (settled, introduced) = match experiment.comments.iter().any(recipe::leaves_open) {
         true => {
-            let source = held_out::split(source::load(&experiment.data, cores)?, experiment)?;
+            let source = source::load_while(&experiment.data, cores, interrupt)?;
+            let source = held_out::split(source, experiment)?;
             introduce(experiment, &source, messages);
             let engine = Engine::new(cores, instruction_set)?;
-            (trial::settle(experiment.clone(), &source, (&engine, interrupt), messages)?, true)
+            let mut bar = progress("", experiment.training.epochs);
+            let settled = trial::settle(experiment.clone(), &source, (&engine, interrupt), &mut *bar, messages)?;
+            bar.finish();
+            (settled, true)
         }
         false => (experiment.clone(), false),
     };
@@ -153,7 +162,7 @@ pub fn train_members(
         let (own, place) = (experiment_of(experiment, k), folder(path, k));
         let quiet = Quiet;
         let heard: &dyn Messages = if k == 1 && !introduced { messages } else { &quiet };
-        let bar = progress(&format!("member {k}: "), own.training.epochs);
+        let bar = progress(&label(k), own.training.epochs);
         let training = train(&own, (&place, wanted), (&engine, interrupt), bar, heard)?;
         Ok::<_, Failure>(Ended {
             run: place.display().to_string(),

@@ -20,6 +20,9 @@ pub trait Progress: fmt::Debug {
     /// The network was looked at on sequences that it does not learn. Comes before the epoch that it belongs to.
     fn held_out(&mut self, _glance: &Glance) {}
 
+    /// Before it begins, something is tried by learning; this is where that stands.
+    fn trying(&mut self, _what: &str, _epoch: u64, _epochs: u64) {}
+
     /// It was found out how many epochs there will be.
     fn expect(&mut self, _total: u64) {}
 

@@ -7,6 +7,7 @@ use sha2::{Digest, Sha256};
 use crate::experiment::{Data, Experiment};
 use crate::failure::{Failure, Result};
 use crate::held_out;
+use crate::interrupt::Interrupt;
 use scrnn_data::{Reading, Remark, read_all, suspicions};
 use scrnn_tasks::{Task, TaskName, interact, make};
 
@@ -55,22 +56,34 @@ pub fn of(experiment: &Experiment, threads: usize) -> Result<Source> {
 /// # Errors
 /// What is wrong with task or files.
 pub fn load(data: &Data, threads: usize) -> Result<Source> {
+    load_while(data, threads, &Interrupt::new())
+}
+
+/// As [`load`], until somebody asks to stop.
+///
+/// # Errors
+/// As [`load`]; [`Failure::Stopped`] if somebody asked to stop while a robot was simulated.
+pub fn load_while(data: &Data, threads: usize, interrupt: &Interrupt) -> Result<Source> {
+    let go_on = || if interrupt.asked() { Err(Failure::Stopped) } else { Ok(()) };
     if let Some(task) = data.task {
         let (sequences, steps) = task.size();
         let size = (data.sequences.unwrap_or(sequences), data.steps.unwrap_or(steps));
         let seed = data.seed.unwrap_or(1);
         if task == TaskName::Reach {
             let tutoring = tutoring(size, data.exact_positions.unwrap_or(false));
-            let demonstrations = tutor::demonstrate(&tutoring, seed, threads)?;
+            let demonstrations = tutor::demonstrate_while(&tutoring, seed, threads, &go_on)?;
             return Ok(Source {
                 demonstrations: demonstrations.clone(),
                 ..Source::of(tutor::dataset(&demonstrations)?)
             });
         }
         if let (TaskName::Interact, Some(left)) = (task, data.left) {
-            return Ok(Source::of(interact::drawn_while(left, size, seed, threads, |_| Ok::<_, Failure>(()))?));
+            return Ok(Source::of(interact::drawn_while(left, size, seed, threads, |_| go_on())?));
         }
-        let Task { data, variances, .. } = make(task, size, seed, threads)?;
+        let Task { data, variances, .. } = match task {
+            TaskName::Interact => interact::make_while(size, seed, threads, |_| go_on())?,
+            _ => make(task, size, seed, threads)?,
+        };
         // The noise of a robot's sensors is not all that cannot be predicted, so the true variances are unknown.
         let truth = (!task.has_robot()).then_some(Truth { task, variances });
         return Ok(Source { truth, ..Source::of(data) });

@@ -78,7 +78,7 @@ pub fn train(
     progress: Box<dyn Progress>,
     messages: &dyn Messages,
 ) -> Result<Training> {
-    let source = source::load(&experiment.data, engine.threads())?;
+    let source = source::load_while(&experiment.data, engine.threads(), interrupt)?;
     train_on(experiment, source, (path, wanted), (engine, interrupt), progress, messages)
 }
 
@@ -102,7 +102,7 @@ pub fn train_on(
     let is_refused = wanted == Found::Refuse && path.join(CHECKPOINT).exists();
     let settled = match is_refused {
         true => experiment.clone(),
-        false => trial::settle(experiment.clone(), &source, (engine, interrupt), messages)?,
+        false => trial::settle(experiment.clone(), &source, (engine, interrupt), &mut *progress, messages)?,
     };
     let experiment = &settled;
     progress.expect(experiment.training.epochs);

@@ -17,7 +17,7 @@ use crate::experiment::{Data, Evaluation, Experiment, HeldOut, HeldOutDrawn};
 use crate::failure::{Failure, Result};
 use crate::held_out;
 use crate::interrupt::Interrupt;
-use crate::messages::Messages;
+use crate::messages::{Messages, Progress};
 use crate::recipe;
 use crate::source::Source;
 
@@ -40,6 +40,7 @@ pub(crate) fn settle(
     mut experiment: Experiment,
     source: &Source,
     (engine, interrupt): (&Engine, &Interrupt),
+    progress: &mut dyn Progress,
     messages: &dyn Messages,
 ) -> Result<Experiment> {
     let Some(at) = experiment.comments.iter().position(recipe::leaves_open) else { return Ok(experiment) };
@@ -57,7 +58,7 @@ pub(crate) fn settle(
         }
         let mut one = experiment.clone();
         one.training.epochs = epochs;
-        let Some(score) = trial.score(&one, engine, interrupt)? else { return Err(Failure::Stopped) };
+        let Some(score) = trial.score(&one, engine, interrupt, progress)? else { return Err(Failure::Stopped) };
         let gained = tried.last().is_none_or(|(_, before)| score < before - GAIN);
         tried.push((epochs, score));
         if !gained {
@@ -104,13 +105,20 @@ impl Trial {
 
     /// How a training of this experiment does on what it did not learn: nats per step and channel one step ahead and alone, added.
     /// Infinite where it diverged; nothing if somebody asked to stop.
-    fn score(&self, experiment: &Experiment, engine: &Engine, interrupt: &Interrupt) -> Result<Option<f64>> {
+    fn score(
+        &self,
+        experiment: &Experiment,
+        engine: &Engine,
+        interrupt: &Interrupt,
+        progress: &mut dyn Progress,
+    ) -> Result<Option<f64>> {
         let topology = experiment.topology(&self.scaled)?;
         let (network, states) = initialize(&topology, self.scaled.sequences().len(), experiment.seed);
         let mut learner = Learner::new(network, states, &self.scaled, experiment.plan(), engine)?;
-        let mut watch = |_: &EpochReport, _: &Learner| match interrupt.asked() {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
+        let epochs = experiment.training.epochs;
+        let mut watch = |report: &EpochReport, _: &Learner| {
+            progress.trying("how long to learn", report.epoch, epochs);
+            if interrupt.asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         match learner.run(&mut watch) {
             Outcome::Stopped => return Ok(None),
@@ -158,7 +166,8 @@ mod tests {
     fn settled(data: Dataset, more: &str) -> (Experiment, Experiment) {
         let text = format!("name = \"x\"\n[data]\nfiles = [\"at_hand.csv\"]\n[training]\nrecipe = \"auto\"\n{more}");
         let (experiment, source) = request::of_text("x", &text, Path::new(""), Some(data)).unwrap();
-        let settled = settle(experiment.clone(), &source, (&engine(), &Interrupt::new()), &Silent).unwrap();
+        let settled =
+            settle(experiment.clone(), &source, (&engine(), &Interrupt::new()), &mut Silent, &Silent).unwrap();
         (experiment, settled)
     }
 
@@ -188,7 +197,7 @@ mod tests {
         let (experiment, source) = request::of_text("x", text, Path::new(""), Some(data(10, 40, 1.0))).unwrap();
         let interrupt = Interrupt::new();
         interrupt.ask();
-        let stopped = settle(experiment, &source, (&engine(), &interrupt), &Silent).unwrap_err();
+        let stopped = settle(experiment, &source, (&engine(), &interrupt), &mut Silent, &Silent).unwrap_err();
         assert!(matches!(stopped, Failure::Stopped), "{stopped}");
     }
 }

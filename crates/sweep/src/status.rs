@@ -112,6 +112,18 @@ impl Status {
     }
 }
 
+/// Where each run of the sweep in `folder` stands: its folder in that of the sweep, and what there is to say of it.
+///
+/// # Errors
+/// As [`Status::read`].
+pub fn each(folder: &Path) -> Result<Vec<Named>> {
+    let one = |run: crate::plan::Run| {
+        let (state, message) = look(&folder.join(&run.folder));
+        Named { run: run.folder, state, message: message.unwrap_or_default() }
+    };
+    Ok(Listed::read(folder)?.runs.into_iter().map(one).collect())
+}
+
 /// Where the run in `folder` stands, and what there is to say of it.
 fn look(folder: &Path) -> (State, Option<String>) {
     if let Some(Outcome { outcome: ended, message, .. }) = outcome::read(folder, OUTCOME) {

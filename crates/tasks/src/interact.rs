@@ -7,7 +7,7 @@ use scrnn::streams::Purpose;
 use scrnn_sim::error::{Error, Result};
 use scrnn_sim::interact::Film;
 use scrnn_sim::interact::{
-    CHANNELS, InteractionOptions, SensorNoise, all_orders, letters, random_order, record, samples,
+    CHANNELS, InteractionOptions, SensorNoise, all_orders, letters, random_order, record, record_while, samples,
 };
 use scrnn_sim::recording::RecordingError;
 
@@ -29,15 +29,15 @@ pub fn make(size: (usize, usize), seed: u64, threads: usize) -> Result<Task> {
     make_while(size, seed, threads, |_| Ok(()))
 }
 
-/// The same; `begin` gets the number of each order before it is recorded; an error of it ends everything.
+/// The same; `at` gets the number of the order at each of its samples; an error of it ends everything.
 ///
 /// # Errors
-/// As [`make`], and those of `begin`.
+/// As [`make`], and those of `at`.
 pub fn make_while<E: From<Error> + Send>(
     (sequences, steps): (usize, usize),
     seed: u64,
     threads: usize,
-    begin: impl Fn(usize) -> std::result::Result<(), E> + Sync,
+    at: impl Fn(usize) -> std::result::Result<(), E> + Sync,
 ) -> std::result::Result<Task, E> {
     let (orders, longest) = size();
     if sequences == 0 || sequences > orders || steps == 0 || steps > longest {
@@ -49,8 +49,7 @@ pub fn make_while<E: From<Error> + Send>(
     let options = InteractionOptions::default();
     let quiet = SensorNoise([0.0; CHANNELS.len()]);
     let one = |k: usize, _threads: usize| -> std::result::Result<_, E> {
-        begin(k)?;
-        Ok(recorded(&orders[k], (seed, k as u64), steps)?)
+        recorded(&orders[k], (seed, k as u64), steps, || at(k))
     };
     let both = side_by_side(sequences, threads, one)?;
     let (data, means): (Vec<Sequence>, Vec<Sequence>) = both.into_iter().unzip();
@@ -63,7 +62,7 @@ pub fn make_while<E: From<Error> + Send>(
 }
 
 /// So many orders drawn at random, as many as there are by default: each branching goes to the left with this probability. An order may come
-/// twice; their numbers tell them apart. `begin` is as in [`make_while`].
+/// twice; their numbers tell them apart. `at` is as in [`make_while`].
 ///
 /// # Errors
 /// As [`make_while`]; [`Error::Setting`] for what is no probability.
@@ -72,7 +71,7 @@ pub fn drawn_while<E: From<Error> + Send>(
     (sequences, steps): (usize, usize),
     seed: u64,
     threads: usize,
-    begin: impl Fn(usize) -> std::result::Result<(), E> + Sync,
+    at: impl Fn(usize) -> std::result::Result<(), E> + Sync,
 ) -> std::result::Result<Dataset, E> {
     let (_, longest) = size();
     if sequences == 0 || steps == 0 || steps > longest || !(0.0..=1.0).contains(&left) {
@@ -82,9 +81,8 @@ pub fn drawn_while<E: From<Error> + Send>(
     }
     let options = InteractionOptions::default();
     let rows = side_by_side(sequences, threads, |k, _| -> std::result::Result<Sequence, E> {
-        begin(k)?;
         let order = random_order(BRANCHES, left, seed, Purpose::RecordingOrders, k as u64);
-        let mut sequence = record(&order, &options, (seed, k as u64), steps, |_, _| {})?;
+        let mut sequence = record_while(&order, &options, (seed, k as u64), steps, |_, _| at(k))?;
         sequence.name = format!("{} {}", sequence.name, k + 1);
         Ok(sequence)
     })?;
@@ -92,12 +90,18 @@ pub fn drawn_while<E: From<Error> + Send>(
 }
 
 /// An order as the sensors gave it, and without their noise.
-fn recorded(order: &[Side], seed: (u64, u64), steps: usize) -> Result<(Sequence, Sequence)> {
+fn recorded<E: From<Error>>(
+    order: &[Side],
+    seed: (u64, u64),
+    steps: usize,
+    at: impl Fn() -> std::result::Result<(), E>,
+) -> std::result::Result<(Sequence, Sequence), E> {
     let mut truth = Vec::new();
-    let noisy = record(order, &InteractionOptions::default(), seed, steps, |interaction, _| {
+    let noisy = record_while(order, &InteractionOptions::default(), seed, steps, |interaction, _| {
         truth.extend(interaction.truth());
+        at()
     })?;
-    Ok((noisy, Sequence::new(letters(order), CHANNELS.len(), truth)?))
+    Ok((noisy, Sequence::new(letters(order), CHANNELS.len(), truth).map_err(Error::from)?))
 }
 
 /// A recording of the first orders, as the bytes of an MCAP file.

@@ -71,7 +71,8 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
     let truth = arguments.truth.clone().or_else(|| arguments.out.as_deref().map(beside));
     check_distinct(&[("--out", arguments.out.as_deref()), ("--truth", truth.as_deref())], &[])?;
     // What goes to a terminal stands there alone.
-    let _busy = arguments.out.is_some().then(|| Busy::with("making the data", shared.quiet));
+    let _busy =
+        (arguments.out.is_some() || !output::is_for_a_person()).then(|| Busy::with("making the data", shared.quiet));
     match (arguments.task, film) {
         (TaskName::Reach, _) => return reach(arguments, size, shared),
         (TaskName::Interact, Some(path)) => {

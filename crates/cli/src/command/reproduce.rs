@@ -10,7 +10,7 @@ use scrnn_run::failure::{Ending, Result};
 
 use crate::args::{MOST_IN_TOML, Shared, whole};
 use crate::output;
-use crate::progress::Bars;
+use crate::progress::Work;
 use crate::signals::Signals;
 
 /// Reproduce an experiment of the thesis, and write a page about it
@@ -87,13 +87,13 @@ fn experiments() -> impl TypedValueParser<Value = &'static Experiment> {
 /// Reproduces.
 pub fn run(arguments: &Arguments, (shared, signals): (&Shared, &Signals)) -> Result<Ending> {
     let interrupt = signals.listen();
-    let bars = Bars::new(shared.quiet);
+    let work = Work::begin(arguments.experiment.word, shared.quiet);
     let context = Context {
         threads: shared.engine()?.threads(),
         instruction_set: shared.instruction_set(),
         interrupt: &interrupt,
-        messages: shared,
-        progress: &|label, epochs| bars.bar(label, epochs),
+        messages: &work,
+        progress: &|label, epochs| work.bar(label, epochs),
     };
     let options = Options {
         preset: arguments.preset.into(),
@@ -105,7 +105,9 @@ pub fn run(arguments: &Arguments, (shared, signals): (&Shared, &Signals)) -> Res
         beyond: arguments.beyond,
         overwrite: arguments.overwrite,
     };
-    let reproduced = arguments.experiment.run(&options, &context)?;
+    let reproduced = arguments.experiment.run(&options, &context);
+    drop(work);
+    let reproduced = reproduced?;
     output::print(if arguments.json { &reproduced.json } else { &reproduced.text })?;
     Ok(reproduced.ending)
 }

@@ -6,7 +6,7 @@ use clap::Args;
 use scrnn_run::failure::{Ending, Failure, Result};
 use scrnn_sweep::plan::{PLAN, Plan};
 use scrnn_sweep::slurm::{self, Called, Request};
-use scrnn_sweep::status::Status;
+use scrnn_sweep::status::{self, Named, State, Status};
 use scrnn_sweep::working::{self, Context, Options, Worked};
 use serde_json::json;
 
@@ -14,6 +14,7 @@ use crate::args::{Shared, count, number};
 use crate::output;
 use crate::progress::Bars;
 use crate::signals::Signals;
+use scrnn_pages::live::{Many, OneOfMany, Stands};
 
 /// Train many networks: knobs times seeds, side by side, on one machine or on many
 ///
@@ -27,6 +28,7 @@ Examples:
   scrnn sweep variances.toml --dry-run          what would be trained
   scrnn sweep variances.toml                    into runs/variances, on all cores
   scrnn sweep variances.toml --status           how far it is; also of the folder alone
+  scrnn sweep variances.toml --watch            with a page that shows all of it
   scrnn sweep variances.toml --shard 2/4        the second quarter of the runs
   scrnn sweep variances.toml --slurm --time 12:00:00 --array-size 20
   scrnn compare runs/variances                  one page and metrics.csv")]
@@ -66,6 +68,11 @@ pub struct Arguments {
     /// With --slurm: tasks of the array, 1 to 100000 [default: one for each run, 64 at most]
     #[arg(long, value_name = "N", requires = "slurm", value_parser = count(1, 100_000))]
     array_size: Option<usize>,
+    /// Serve a page on this machine that shows all runs as they go on, at this port or any that is free; with --status whoever works on
+    /// them, until Ctrl-C
+    #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "0", require_equals = true,
+        conflicts_with_all = ["dry_run", "slurm"])]
+    watch: Option<u16>,
     /// Print a JSON object
     #[arg(long)]
     json: bool,
@@ -80,7 +87,7 @@ fn shard(text: &str) -> std::result::Result<(usize, usize), String> {
 /// Works on a sweep, or shows it.
 pub fn run(arguments: &Arguments, (shared, signals): (&Shared, &Signals)) -> Result<Ending> {
     if arguments.status && arguments.sweep.join(PLAN).is_file() {
-        return show_status(&arguments.sweep, arguments.json);
+        return show_status(&arguments.sweep, arguments, signals);
     }
     if arguments.sweep.is_dir() {
         let message = format!("{} is a folder, not a sweep file", arguments.sweep.display());
@@ -92,7 +99,7 @@ pub fn run(arguments: &Arguments, (shared, signals): (&Shared, &Signals)) -> Res
     let plan = Plan::read(&arguments.sweep)?;
     let folder = arguments.out.clone().unwrap_or_else(|| Path::new("runs").join(&plan.file.name));
     if arguments.status {
-        return show_status(&folder, arguments.json);
+        return show_status(&folder, arguments, signals);
     }
     if arguments.slurm {
         return queue(arguments, (shared, &plan), &folder);
@@ -115,6 +122,7 @@ pub fn run(arguments: &Arguments, (shared, signals): (&Shared, &Signals)) -> Res
         retry: arguments.retry,
         wait: !arguments.no_wait,
     };
+    let _page = page(arguments, &folder)?;
     let worked = working::work(&plan, &folder, &options, &context)?;
     if arguments.json {
         output::print_json(&worked)?;
@@ -136,9 +144,42 @@ fn ending(worked: &Worked, arguments: &Arguments, shared: &Shared) -> Ending {
     worked.ending()
 }
 
-fn show_status(folder: &Path, json: bool) -> Result<Ending> {
+/// Serves a page about the runs in the folder of a sweep, if that is wanted.
+fn page(arguments: &Arguments, folder: &Path) -> Result<Option<Many>> {
+    let Some(port) = arguments.watch else { return Ok(None) };
+    let name = folder.file_name().unwrap_or(folder.as_os_str()).to_string_lossy().into_owned();
+    let epochs = Plan::read(&arguments.sweep).ok().and_then(|plan| Some((plan.runs.first()?.clone(), plan)));
+    let epochs = epochs.and_then(|(run, plan)| Some(plan.experiment(&run).ok()?.training.epochs)).unwrap_or(0);
+    let folder = folder.to_owned();
+    let look = move || {
+        let one = |Named { run, state, message }: Named| OneOfMany {
+            folder: folder.join(&run),
+            name: run,
+            stands: match state {
+                State::Finished => Stands::Finished,
+                State::Working => Stands::Working,
+                State::Diverged | State::Killed | State::Failed => Stands::Failed,
+                State::Interrupted => Stands::Interrupted,
+                State::Waiting => Stands::Waiting,
+            },
+            message,
+        };
+        Ok(status::each(&folder)?.into_iter().map(one).collect())
+    };
+    let page = Many::start(port, &format!("Sweep: {name}"), epochs, Box::new(look))?;
+    output::say(format_args!("watch it at {}", page.url()));
+    Ok(Some(page))
+}
+
+fn show_status(folder: &Path, arguments: &Arguments, signals: &Signals) -> Result<Ending> {
     let status = Status::read(folder)?;
-    match json {
+    if let Some(_page) = page(arguments, folder)? {
+        let interrupt = signals.listen();
+        while !interrupt.asked() {
+            std::thread::sleep(std::time::Duration::from_millis(100));
+        }
+    }
+    match arguments.json {
         true => output::print_json(&status)?,
         false => output::print(&status.to_string())?,
     }

@@ -10,7 +10,7 @@ use crate::args::{MOST_IN_TOML, Part, Shared, whole};
 use crate::output;
 use crate::progress::{Bars, Busy};
 use crate::signals::Signals;
-use scrnn_pages::live::Live;
+use scrnn_pages::live::{Ends, Live, Many, OneOfMany, Stands};
 use scrnn_run::experiment::{Experiment, Override};
 use scrnn_run::failure::{Ending, Failure, Result};
 use scrnn_run::interrupt::Interrupt;
@@ -110,10 +110,7 @@ pub fn run(arguments: &Arguments, (shared, signals): (&Shared, &Signals)) -> Res
         Found::Refuse
     };
     if mixture {
-        if arguments.watch.is_some() {
-            return Err(Failure::input("--watch shows one training, and this is a mixture", "train without --watch"));
-        }
-        return train_mixture(&experiment, (&path, found), (shared, &engine, &interrupt), arguments.json);
+        return train_mixture(&experiment, (&path, found), (shared, &engine, &interrupt), arguments);
     }
     if !members::folders(&path).is_empty() {
         let message = format!("{} holds a mixture of networks", path.display());
@@ -123,7 +120,7 @@ pub fn run(arguments: &Arguments, (shared, signals): (&Shared, &Signals)) -> Res
         Some(source) => source,
         None => {
             let _busy = Busy::with("making the data", shared.quiet);
-            source::load(&experiment.data, engine.threads())?
+            source::load_while(&experiment.data, engine.threads(), &interrupt)?
         }
     };
     let mut progress = Bars::new(shared.quiet).bar("", experiment.training.epochs);
@@ -187,10 +184,21 @@ fn train_mixture(
     experiment: &Experiment,
     (path, found): (&Path, Found),
     (shared, engine, interrupt): (&Shared, &Engine, &Interrupt),
-    json: bool,
+    &Arguments { watch, json, .. }: &Arguments,
 ) -> Result<Ending> {
     let bars = Bars::new(shared.quiet);
-    let progress = |label: &str, epochs: u64| bars.bar(label, epochs);
+    let ends = Ends::default();
+    let progress = |label: &str, epochs: u64| ends.watching(label, bars.bar(label, epochs));
+    let page = watch.map(|port| {
+        let (path, ends) = (path.to_owned(), ends.clone());
+        let members = usize::try_from(experiment.training.members.unwrap_or(1)).unwrap_or(1);
+        let look = move || Ok((1..=members).map(|k| member(k, &path, &ends)).collect());
+        Many::start(port, &format!("Mixture: {}", experiment.name), experiment.training.epochs, Box::new(look))
+    });
+    let page = page.transpose()?;
+    if let Some(page) = &page {
+        output::say(format_args!("watch it at {}", page.url()));
+    }
     let machine = (engine.threads(), engine.instruction_set(), interrupt);
     let verdict = train_members(experiment, (path, found), machine, &progress, shared)?;
     match json {
@@ -203,6 +211,17 @@ fn train_mixture(
         return Ok(Ending::Interrupted);
     }
     Ok(if verdict.diverged() { Ending::Diverged } else { Ending::Done })
+}
+
+/// Where a member stands that this process trains.
+fn member(k: usize, run: &Path, ends: &Ends) -> OneOfMany {
+    let folder = members::folder(run, k);
+    let stands = match (ends.contains(&members::label(k)), folder.join(CHECKPOINT).exists()) {
+        (true, _) => Stands::Finished,
+        (false, true) => Stands::Working,
+        (false, false) => Stands::Waiting,
+    };
+    OneOfMany { name: format!("member {k}"), folder, stands, message: String::new() }
 }
 
 /// Tells what to do about an end before the last epoch.

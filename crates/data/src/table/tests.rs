@@ -239,3 +239,34 @@ fn a_stamp_without_a_name_is_a_clock() {
         assert!(contents(text).0.len() > 1 && contents(text).0[0] == "y1", "{text}");
     }
 }
+
+/// A hundred samples a tenth of a second apart, with one pause after the fiftieth.
+fn paused(pause: f64) -> String {
+    let time = |k: usize| 0.1 * k as f64 + if k > 49 { pause } else { 0.0 };
+    let rows = (0..100).map(|k| format!("{:.1},{}\n", time(k), (k as f64).sin()));
+    format!("time,a\n{}", rows.collect::<String>())
+}
+
+#[test]
+fn what_a_message_about_uneven_times_suggests_is_not_refused_in_turn() {
+    use miette::Diagnostic;
+    let parse = |text: &str, period: Option<f64>| {
+        let selection = Selection { period, ..Selection::default() };
+        crate::parse_as(std::path::Path::new("data.csv"), text.as_bytes(), &selection)
+    };
+    for (pause, bridged) in [(0.5, true), (0.8, true), (1.2, false), (300.0, false)] {
+        let text = paused(pause);
+        let help = parse(&text, None).unwrap_err().help().unwrap().to_string();
+        assert_eq!(help.contains("`period = 0.1`"), bridged, "{pause} s: {help}");
+        assert_eq!(parse(&text, Some(0.1)).is_ok(), bridged, "{pause} s");
+        // The other way out is one: two sequences, each with even steps.
+        let named = |(k, row): (usize, &str)| match k {
+            0 => format!("sequence,{row}\n"),
+            1..=50 => format!("a,{row}\n"),
+            _ => format!("b,{row}\n"),
+        };
+        let cut: String = text.lines().enumerate().map(named).collect();
+        assert!(bridged || help.contains("a column `sequence` that changes there"), "{help}");
+        assert_eq!(parse(&cut, None).unwrap().sequences().len(), 2);
+    }
+}

@@ -22,8 +22,12 @@ use scrnn_run::run_folder::BEST;
 use scrnn_run::trained::{Trained, read_checkpoint};
 use serde_json::{Value, json};
 
+mod many;
+mod motion;
 mod server;
 
+pub use many::{Ends, LookAtAll, Many, OneOfMany, Stands};
+pub use motion::{Frame, Heading, Look, Motion, Sample};
 pub use server::{Answer, Server};
 
 /// Points of a learning curve; beyond, every second one goes.
@@ -89,6 +93,16 @@ fn locked(state: &Mutex<State>) -> MutexGuard<'_, State> {
     state.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Serves on the loopback address.
+fn served(port: u16, answer: Box<Answer>) -> Result<Server> {
+    Server::start(port, answer).map_err(|error| {
+        Failure::input(
+            format!("nothing can be served on port {port}: {error}"),
+            "give another, or 0 for any that is free",
+        )
+    })
+}
+
 impl Live {
     /// Serves a page about the training of `name` in a run folder. Of `data` it draws a few sequences beside the best network.
     ///
@@ -122,13 +136,7 @@ impl Live {
             }
             _ => None,
         };
-        let server = Server::start(port, Box::new(answer)).map_err(|error| {
-            Failure::input(
-                format!("nothing can be served on port {port}: {error}"),
-                "give another, or 0 for any that is free",
-            )
-        })?;
-        Ok(Self { state, server })
+        Ok(Self { state, server: served(port, Box::new(answer))? })
     }
 
     /// Where it is read.
@@ -177,6 +185,15 @@ impl Progress for Watched {
             state.calibration = glance.closed_loop.within_one.zip(glance.closed_loop.within_two);
         }
         self.inner.held_out(glance);
+    }
+
+    fn trying(&mut self, what: &str, epoch: u64, epochs: u64) {
+        self.inner.trying(what, epoch, epochs);
+    }
+
+    fn expect(&mut self, total: u64) {
+        locked(&self.state).epochs = total;
+        self.inner.expect(total);
     }
 
     fn say(&self, message: &str) {

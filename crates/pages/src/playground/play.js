@@ -35,8 +35,8 @@
   };
 
   // The closed loop: what was predicted, with its noise if there is any, is what comes in when it is due.
-  const run = ({ internal, first, steps, noise, seed, push, when, channel }) => {
-    const now = net.begin([internal]), random = normal(seed), samples = [];
+  const run = ({ internal, others, first, steps, noise, seed, push, when, channel }) => {
+    const now = net.begin([internal, ...(others || [])]), random = normal(seed), samples = [];
     const out = { mean: [], variance: [], sample: [], context: [] };
     for (let k = 0; k < steps; k++) {
       const x = k < delay ? first[k].slice() : samples[k - delay].slice();
@@ -79,7 +79,7 @@
   const spread = [0, 1].map((k) => range(data.plane.points.map((point) => point[k])));
   const room = spread.map(([a, b]) => [a - 0.15 * (b - a), b + 0.15 * (b - a)]);
   const [left, top, width, height] = [8, 18, 304, 274];
-  const place = axes(plane, [left, top, width, height], room[0], room[1], "initial states: first component across, second up", false);
+  const place = axes(plane, [left, top, width, height], room[0], room[1], data.plane.label, false);
   data.plane.points.forEach((point, k) => {
     const [cx, cy] = place(point);
     const dot = make(plane, "circle", { cx, cy, r: 4, class: "learned", fill: levels[(data.plane.kinds[k] || 0) % 4] });
@@ -96,7 +96,7 @@
     const name = data.plane.names[state.nearest];
     handle.setAttribute("aria-valuetext", `${short(state.at[0])}, ${short(state.at[1])}, nearest to ${name}`);
     find("where").textContent = apart[state.nearest] === 0 ? `the state of ${name}` : `between the learned states; nearest is ${name}`;
-    const ran = run({ ...state, internal: internal(state.at), first: data.plane.begins[state.nearest] });
+    const ran = run({ ...state, internal: internal(state.at), others: data.plane.others[state.nearest], first: data.plane.begins[state.nearest] });
     const time = (k) => k + delay + 1;
     const paint = find("time");
     paint.replaceChildren();
@@ -158,5 +158,5 @@
   find("when").max = state.steps - 1;
   draw();
   // For tests, and for whoever wants the numbers.
-  window.scrnnPlayground = { run: (options) => run({ ...state, internal: internal(state.at), first: data.plane.begins[state.nearest], ...options }), state, draw, data, place };
+  window.scrnnPlayground = { run: (options) => run({ ...state, internal: internal(state.at), others: data.plane.others[state.nearest], first: data.plane.begins[state.nearest], ...options }), state, draw, data, place };
 })();

@@ -16,6 +16,7 @@ mod bodies;
 mod signals;
 
 use bodies::Bodies;
+pub(crate) use bodies::base64;
 use signals::Signals;
 
 /// Bytes of places of bodies in a page, before they become text; more pictures than fit are thinned out.
@@ -265,7 +266,7 @@ impl Story {
                 .into(),
             body: BODY.into(),
             style: include_str!("view.css"),
-            script: include_str!("view.js"),
+            script: concat!(include_str!("scene.js"), include_str!("view.js")),
             data: data.to_string(),
         };
         let mut sections = vec![Section { title: "Recording".into(), blocks: vec![Block::Applet(Box::new(applet))] }];

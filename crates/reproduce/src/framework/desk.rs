@@ -13,7 +13,7 @@ use super::kept::Kept;
 use super::stop::{Result, Stop};
 
 /// Silence lasts no longer than this, where an evaluation says what it is at.
-const BETWEEN_NEWS: Duration = Duration::from_secs(5);
+const BETWEEN_NEWS: Duration = Duration::from_secs(2);
 
 /// What an evaluation is given. It can be shared by threads.
 pub struct Desk<'a> {

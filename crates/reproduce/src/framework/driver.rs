@@ -16,6 +16,7 @@ use scrnn_run::training::{Found, Training, train};
 use super::condition::Condition;
 use super::context::Context;
 use super::desk::Desk;
+use super::film::{self, Film};
 use super::job_result::{JobResult, TrainingFacts};
 use super::kept::{Decides, EVALUATION, Kept};
 use super::measure::{Measure, Summary};
@@ -32,6 +33,7 @@ struct Done<S: Study> {
     result: JobResult<S::Findings>,
     networks: Vec<Learned>,
     material: S::Material,
+    films: Vec<Film>,
 }
 
 /// Reproduces the experiment called `name`.
@@ -87,13 +89,16 @@ impl<S: Study> Reproduction<'_, S> {
         let mut done: Vec<Option<Done<S>>> =
             side_by_side(places.len(), context.threads, one)?.into_iter().map(Some).collect();
 
-        let (mut jobs, mut networks, mut materials) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut jobs, mut networks, mut materials, mut films) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for wanted in 0..conditions.len() {
             for (&(condition, _), done) in places.iter().zip(&mut done) {
-                if let Some(Done { result, networks: own, material }) = done.take_if(|_| condition == wanted) {
+                if let Some(Done { result, networks: own, material, films: shot }) =
+                    done.take_if(|_| condition == wanted)
+                {
                     jobs.push(result);
                     networks.push(own);
                     materials.push(material);
+                    films.extend(shot);
                 }
             }
         }
@@ -109,7 +114,7 @@ impl<S: Study> Reproduction<'_, S> {
             verdicts: study.verdicts(&results),
             results: &results,
         };
-        let page = overview::page(study, &metrics, &networks, &materials);
+        let page = overview::page(study, &metrics, (&networks, &materials), film::write(&films, &folder)?);
         let text = metrics.json();
         folder.write(METRICS, text.as_bytes())?;
         scrnn_pages::write(&page, folder.path())?;
@@ -174,6 +179,7 @@ impl<S: Study> Reproduction<'_, S> {
         let job = Job { condition, seed, first, networks: &networks };
         let (findings, material) = study.evaluate(&job, &desk)?;
         desk.go_on()?;
+        let films = study.films(&job, &desk)?;
         let evaluated = clock.elapsed().as_secs_f64() + desk.saved();
         let result = JobResult {
             condition: Some(condition.key).filter(|key| !key.is_empty()),
@@ -184,7 +190,7 @@ impl<S: Study> Reproduction<'_, S> {
             trainings: networks.iter().map(|network| network.training.clone()).collect(),
             findings,
         };
-        Ok(Done { result, networks, material })
+        Ok(Done { result, networks, material, films })
     }
 
     /// Everything that decides the result of an evaluation. A checkpoint knows the digest of the data that it learned.

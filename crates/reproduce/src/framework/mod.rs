@@ -10,7 +10,7 @@
 //! |---|---|
 //! | [`study`], [`condition`] | the trait, a job, a trained network; under which circumstances networks learn |
 //! | [`preset`] | the experiment files of a study's networks |
-//! | [`driver`] | from options to a page |
+//! | [`driver`], [`film`] | from options to a page; recordings beside it |
 //! | [`desk`], [`kept`] | what an evaluation is given; parts of evaluations in files |
 //! | [`job_result`], [`results`] | the results of one job, and of all of them |
 //! | [`measure`], [`comparison`], [`verdict`], [`table`] | what is made of it |
@@ -23,6 +23,7 @@ pub mod condition;
 pub mod context;
 pub mod desk;
 pub mod driver;
+pub mod film;
 pub mod job_result;
 pub mod kept;
 pub mod measure;
@@ -47,6 +48,7 @@ pub use comparison::Comparison;
 pub use condition::Condition;
 pub use desk::Desk;
 pub use driver::reproduce;
+pub use film::Film;
 pub use job_result::JobResult;
 pub use measure::{Measure, Summary};
 pub use preset::Kind;

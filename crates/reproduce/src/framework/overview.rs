@@ -13,14 +13,20 @@ use super::metrics::Metrics;
 use super::results::Results;
 use super::study::{Learned, Study};
 
-/// The whole page. Networks and materials come in the order of the jobs.
+/// The whole page. Networks and materials come in the order of the jobs; `films` leads to what can be watched.
 pub fn page<S: Study>(
     study: &S,
     metrics: &Metrics<'_, S::Findings>,
-    networks: &[Vec<Learned>],
-    materials: &[S::Material],
+    (networks, materials): (&[Vec<Learned>], &[S::Material]),
+    films: Option<Block>,
 ) -> Page {
-    let mut sections = vec![goals_and_measures(metrics)];
+    let mut sections = Vec::new();
+    if let Some(links) = films {
+        let text = "What the first network does, on pages that play it:";
+        let blocks = vec![Block::Text(text.into()), links];
+        sections.push(Section { title: "The robot at work".into(), blocks });
+    }
+    sections.push(goals_and_measures(metrics));
     sections.extend(study.sections(metrics.results, materials));
     sections.push(learning(metrics.results, networks));
     sections.push(circumstances(metrics));

@@ -16,7 +16,10 @@ pub type Result<T> = std::result::Result<T, Stop>;
 
 impl From<Failure> for Stop {
     fn from(failure: Failure) -> Self {
-        Self::Failed(failure)
+        match failure {
+            Failure::Stopped => Self::Interrupted,
+            failure => Self::Failed(failure),
+        }
     }
 }
 
@@ -34,6 +37,12 @@ impl From<scrnn_sim::error::Error> for Stop {
 
 impl From<scrnn_data::FileError> for Stop {
     fn from(error: scrnn_data::FileError) -> Self {
+        Self::Failed(error.into())
+    }
+}
+
+impl From<scrnn_sim::recording::RecordingError> for Stop {
+    fn from(error: scrnn_sim::recording::RecordingError) -> Self {
         Self::Failed(error.into())
     }
 }

@@ -14,6 +14,7 @@ use serde::Serialize;
 use super::comparison::Comparison;
 use super::condition::Condition;
 use super::desk::Desk;
+use super::film::Film;
 use super::job_result::TrainingFacts;
 use super::measure::Measure;
 use super::options::Options;
@@ -68,6 +69,11 @@ pub trait Study: Sync {
     ///
     /// What takes long is a [`Desk::part`], and asks the desk whether to go on.
     fn evaluate(&self, job: &Job<'_>, desk: &Desk<'_>) -> Result<(Self::Findings, Self::Material)>;
+
+    /// Closed loops of robots to be watched, of the jobs that the page shows.
+    fn films(&self, _job: &Job<'_>, _desk: &Desk<'_>) -> Result<Vec<Film>> {
+        Ok(Vec::new())
+    }
 
     /// What is compared with the thesis and over seeds.
     fn measures(&self) -> Vec<Measure<Self::Findings>>;

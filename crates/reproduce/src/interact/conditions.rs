@@ -107,10 +107,10 @@ impl Setting {
         }
         desk.say(&format!("{}: recordings of two robots", self.condition.label));
         let (sequences, steps) = interact::size();
-        let begin = |k: usize| desk.at(|| format!("{}: recording {} of {sequences}", self.condition.label, k + 1));
+        let at = |k: usize| desk.at(|| format!("{}: recording {} of {sequences}", self.condition.label, k + 1));
         let data = match self.left {
-            None => interact::make_while((sequences, steps), seed, threads, begin)?.data,
-            Some(left) => interact::drawn_while(left, (sequences, steps), seed, threads, begin)?,
+            None => interact::make_while((sequences, steps), seed, threads, at)?.data,
+            Some(left) => interact::drawn_while(left, (sequences, steps), seed, threads, at)?,
         };
         Ok(files::write(&path, &[Field { name: "", data: &data }])?)
     }

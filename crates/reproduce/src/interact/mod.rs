@@ -15,7 +15,7 @@ use scrnn_report::Section;
 use scrnn_run::experiment::Experiment;
 
 use crate::framework::options::Options;
-use crate::framework::{Comparison, Condition, Desk, Job, Measure, Result, Results, Study, Table, Verdict};
+use crate::framework::{Comparison, Condition, Desk, Film, Job, Measure, Result, Results, Study, Table, Verdict};
 use conditions::setting;
 use figures::Material;
 use findings::Findings;
@@ -90,6 +90,24 @@ impl Study for Interact {
             false => None,
         };
         Ok((findings, material))
+    }
+
+    fn films(&self, job: &Job<'_>, desk: &Desk<'_>) -> Result<Vec<Film>> {
+        let (setting, learned) = (setting(job.condition.key), &job.networks[0]);
+        if !(job.first && setting.of_thesis) {
+            return Ok(Vec::new());
+        }
+        desk.at(|| format!("{}: a recording", setting.condition.label))?;
+        let scaled = learned.scaling.apply(&learned.source.data)?;
+        let subject = Subject {
+            network: &learned.network,
+            states: &learned.initial_states,
+            scaling: &learned.scaling,
+            data: &scaled,
+            seed: job.seed,
+            desk,
+        };
+        Ok(vec![subject.film(setting.condition.key, setting.condition.label)?])
     }
 
     fn measures(&self) -> Vec<Measure<Findings>> {

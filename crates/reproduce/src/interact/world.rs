@@ -3,13 +3,14 @@
 
 use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions};
 use scrnn::streams::Purpose;
+use scrnn_sim::interact::Film as Recording;
 use scrnn_sim::interact::{Branch, Controller, Followed, Outcome, follow, with_own_arm};
 use scrnn_sim::interact::{Interaction, InteractionOptions, parse_order, random_order};
 use scrnn_tasks::interact::BRANCHES;
 use serde::Serialize;
 
-use super::trials::Subject;
-use crate::framework::Result;
+use super::trials::{OTHER, Subject};
+use crate::framework::{Film, Result};
 
 /// The order of the figures (5.3.2).
 pub const SHOWN: &str = "RLLLR";
@@ -75,6 +76,27 @@ impl Subject<'_> {
             watch(regression);
             self.desk.go_on()
         })
+    }
+
+    /// The order of the figures with error regression from a state that does not correspond, as a recording.
+    pub fn film(&self, key: &str, label: &str) -> Result<Film> {
+        let options = with_own_arm(ErrorRegressionOptions::new(self.data.channels().len()));
+        let state = self.states.sequence(self.other());
+        let mut interaction = Interaction::new(&parse_order(SHOWN)?, &InteractionOptions::default(), self.seed, 0)?;
+        let mut film = Recording::new(&[("task", "interact")])?;
+        film.begin(SHOWN)?;
+        let observe = |regression: &mut ErrorRegression, sample: &[f64]| regression.observe(sample, &mut || true);
+        let raw = |y: [f64; 8]| (0..8).map(|i| self.scaling.to_raw(i, y[i])).collect::<Vec<_>>();
+        follow(&self.controller(state), &options, &mut interaction, observe, |interaction, step, _| {
+            let mean = step.predicted.map(raw);
+            let variance = step.variance.iter().enumerate().map(|(i, &v)| self.scaling.variance_to_raw(i, v));
+            let variance: Vec<f64> = variance.collect();
+            let variance = Some(variance.as_slice()).filter(|variance| !variance.is_empty());
+            film.frame(interaction, &step.sensed, mean.as_deref().map(|mean| (mean, variance)))?;
+            self.desk.go_on()
+        })?;
+        let about = format!("{label}: order {SHOWN} from the state of {OTHER}, with error regression");
+        Ok(Film { name: format!("interact-{key}"), about, bytes: film.finish()? })
     }
 
     /// So many random orders from one state. Every network meets the same orders.

@@ -8,13 +8,16 @@ mod trials;
 mod variance;
 mod variance_page;
 
-use scrnn_sim::reach::agent::{Noise, Performance};
+use std::io::Cursor;
+
+use scrnn_sim::reach::agent::{NetworkDriver, Noise, Performance, Snapshot, perform};
 use scrnn_sim::reach::channels::REACHING;
+use scrnn_sim::reach::recording::ReachingRecording;
 use scrnn_sim::reach::stage::{POSITIONS, gaze_at, places_between};
 use scrnn_sim::robot::nao;
 
 use crate::framework::preset::asset;
-use crate::framework::{Condition, Desk, Job, Kind, Measure, Result, Results, Study, Verdict, in_trial};
+use crate::framework::{Condition, Desk, Film, Job, Kind, Learned, Measure, Result, Results, Study, Verdict, in_trial};
 use findings::{Driven, Findings, Material};
 use scrnn_report::Section;
 use scrnn_run::assessment;
@@ -41,6 +44,9 @@ const FIRST_SHIFT: usize = 48;
 
 /// The driver of the figures: the network with the noise that it predicts.
 const WITH_NOISE: &str = "noise";
+
+/// Cycles of a recording: its page stays small.
+const FILMED: usize = 5;
 
 /// Number of the first trial whose sphere is shifted; those before it are one for each place.
 const FIRST_SHIFTED: u64 = 100;
@@ -96,6 +102,24 @@ fn plans(study: &Reach, places: &[f64], constant: Vec<f64>, frozen: [f64; 2]) ->
         plan("mixture", "GMM/GMR, mean", Who::Mixture { noise: false }, fewer),
         plan("mixture_noise", "GMM/GMR, noise of its covariance", Who::Mixture { noise: true }, fewer),
     ]
+}
+
+/// The S-CTRNN at one of the learned positions, with the noise that it predicts.
+fn film(learned: &Learned, (y, position): (f64, usize), seed: u64, desk: &Desk<'_>) -> Result<Film> {
+    desk.at(|| format!("a recording at position {position}"))?;
+    let seed = in_trial(seed, position as u64 - 1);
+    let Learned { network, initial_states, scaling, .. } = learned;
+    let mut driver =
+        NetworkDriver::new(network, initial_states.mean(), scaling, &Noise::Predicted, seed, desk.engine())?;
+    let mut recording = ReachingRecording::new(Cursor::new(Vec::new()), None, &[("task", "reach")])?;
+    recording.begin_sequence(0.0, &format!("position {position}"))?;
+    let mut look = |snapshot: &Snapshot<'_>| -> Result<()> {
+        recording.snapshot(snapshot)?;
+        if snapshot.decision.is_some() { desk.go_on() } else { Ok(()) }
+    };
+    perform(&still(y, FILMED), &mut driver, &mut look)?;
+    let about = format!("NAO reaches, the sphere at position {position}");
+    Ok(Film { name: format!("reach-{position}"), about, bytes: recording.finish()?.into_inner() })
 }
 
 impl Study for Reach {
@@ -193,6 +217,11 @@ impl Study for Reach {
         // The positions and what lies half way, from right to left.
         let performances = [0, 3, 1, 4, 2].map(|k| with_noise[k].clone()).into_iter().collect();
         Ok((findings, Material { demonstrations: demonstrations.clone(), performances }))
+    }
+
+    fn films(&self, job: &Job<'_>, desk: &Desk<'_>) -> Result<Vec<Film>> {
+        let places = POSITIONS.iter().zip(1..).filter(|_| job.first);
+        places.map(|(&y, position)| film(&job.networks[0], (y, position), job.seed, desk)).collect()
     }
 
     fn measures(&self) -> Vec<Measure<Findings>> {

@@ -119,7 +119,7 @@ impl<'a> Company<'a> {
     }
 
     /// Gives one performance.
-    fn give(&self, trial: &Trial) -> Result<Given> {
+    fn give(&self, trial: &Trial, desk: &Desk<'_>) -> Result<Given> {
         let mut driver = self.driver(trial)?;
         let mut pictures = Vec::new();
         let clock = ProcessorTime::start();
@@ -128,7 +128,7 @@ impl<'a> Company<'a> {
             if trial.pictures && glimpse.decision.is_none() && time + 1e-9 > 0.1 * (pictures.len() + 1) as f64 {
                 pictures.push((time, glimpse.stage.world().scene()));
             }
-            Ok(())
+            if glimpse.decision.is_some() { desk.go_on() } else { Ok(()) }
         };
         let performed = perform(&trial.performance, driver.as_mut(), &mut look)?;
         let speed = trial.performance.samples as f64 * PERIOD / clock.seconds();
@@ -139,7 +139,7 @@ impl<'a> Company<'a> {
     pub fn give_all(&self, label: &str, trials: &[Trial], desk: &Desk<'_>) -> Result<Vec<Given>> {
         side_by_side(trials.len(), desk.engine().threads(), |k, _| {
             desk.at(|| format!("{label}, {} of {}", k + 1, trials.len()))?;
-            self.give(&trials[k])
+            self.give(&trials[k], desk)
         })
     }
 }

@@ -5,8 +5,8 @@ use std::io::Cursor;
 use scrnn::analysis::excursions::Side;
 
 use super::interaction::{CHANNELS, Interaction};
-use super::order::{PERIOD, branchings};
-use crate::recording::{Heading, Joint, Recorder, RecordingError, Robot};
+use super::order::PERIOD;
+use crate::recording::{Contact, Heading, Joint, Recorder, RecordingError, Robot};
 use crate::robot::joints::{HEAD, RIGHT_ARM};
 use crate::robot::nao;
 
@@ -80,14 +80,17 @@ impl Film {
         if let Some((mean, variance)) = predicted {
             recorder.predicted(time, mean, variance)?;
         }
+        let contacts = interaction.contacts().into_iter();
+        let contacts =
+            contacts.map(|([a, b], depth, force)| Contact { a, b, distance: Some(-depth), force: Some(force) });
+        recorder.contacts(time, &contacts.collect::<Vec<_>>())?;
         if let Some(collision) = interaction.collision() {
             let depth = interaction.depth();
             recorder.event(time, &format!("collision with {collision:?}").to_lowercase(), &[("depth", depth)])?;
         }
-        let (order, sample) = (interaction.order(), (interaction.time() / PERIOD).round() as usize);
-        if let Some(branch) = branchings(order.len()).iter().position(|at| *at == sample) {
-            let side = if order[branch] == Side::Left { "left" } else { "right" };
-            recorder.event(time, &format!("branching {} to the {side}", branch + 1), &[])?;
+        if let Some((branch, side)) = interaction.branching() {
+            let side = if side == Side::Left { "left" } else { "right" };
+            recorder.event(time, &format!("branching {branch} to the {side}"), &[])?;
         }
         let in_view = interaction.object_in_view();
         if in_view != self.in_view {

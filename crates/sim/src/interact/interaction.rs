@@ -13,13 +13,13 @@ use scrnn::analysis::excursions::Side;
 use scrnn::dataset::Sequence;
 use scrnn::streams::{Purpose, stream};
 
-use super::order::{PERIOD, letters, out, samples};
+use super::order::{PERIOD, branchings, letters, out, samples};
 use crate::error::{Error, Result};
 use crate::robot::gaze::{Gaze, LaggingGaze};
 use crate::robot::joints::{HEAD, RIGHT_ARM};
 use crate::robot::nao;
 use crate::world::scene::{Part, Scene, Shape};
-use crate::world::{BodyId, JointState, Placement, RobotId, World, WorldOptions};
+use crate::world::{BodyId, Contact, JointState, Placement, RobotId, World, WorldOptions};
 
 /// Channels of a sample: the object's centre in the image, head and right arm of the self-robot.
 pub const CHANNELS: [&str; 8] =
@@ -320,6 +320,22 @@ impl Interaction {
         self.collision
     }
 
+    /// All that touch each other now: names of two bodies, how deep they are in each other in metres, and the force in newtons.
+    #[must_use]
+    pub fn contacts(&self) -> Vec<([&str; 2], f64, f64)> {
+        let named =
+            |contact: Contact| (contact.bodies.map(|body| self.world.name_of(body)), contact.depth, contact.force);
+        self.world.contacts().into_iter().map(named).collect()
+    }
+
+    /// The number of the branching that begins now, from 1, and the side to which the object goes.
+    #[must_use]
+    pub fn branching(&self) -> Option<(usize, Side)> {
+        let sample = (self.time() / PERIOD).round() as usize;
+        let branch = branchings(self.order.len()).iter().position(|at| *at == sample)?;
+        Some((branch + 1, self.order[branch]))
+    }
+
     /// How deep it ran into it, in metres.
     #[must_use]
     pub fn depth(&self) -> f64 {
@@ -383,16 +399,33 @@ pub fn record(
     count: usize,
     mut watch: impl FnMut(&Interaction, &[f64; 8]),
 ) -> Result<Sequence> {
+    record_while(order, options, (seed, index), count, |interaction, sample| {
+        watch(interaction, sample);
+        Ok::<(), Error>(())
+    })
+}
+
+/// As [`record`]; an error of `watch` ends the recording.
+///
+/// # Errors
+/// As [`record`], and those of `watch`.
+pub fn record_while<E: From<Error>>(
+    order: &[Side],
+    options: &InteractionOptions,
+    (seed, index): (u64, u64),
+    count: usize,
+    mut watch: impl FnMut(&Interaction, &[f64; 8]) -> std::result::Result<(), E>,
+) -> std::result::Result<Sequence, E> {
     let mut interaction = Interaction::with_noise(order, options, stream(seed, Purpose::RecordingSensors, index))?;
     let count = count.min(samples(order));
     let mut values = Vec::with_capacity(count * CHANNELS.len());
     for _ in 0..count {
         let sample = interaction.sense();
-        watch(&interaction, &sample);
+        watch(&interaction, &sample)?;
         values.extend(sample);
         interaction.step_tutored();
     }
-    Ok(Sequence::new(letters(order), CHANNELS.len(), values)?)
+    Ok(Sequence::new(letters(order), CHANNELS.len(), values).map_err(Error::from)?)
 }
 
 #[cfg(test)]

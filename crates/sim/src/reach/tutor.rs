@@ -84,7 +84,20 @@ pub struct Demonstration {
 /// # Errors
 /// [`Error::Setting`] for nothing to demonstrate, or a placement beyond the bench.
 pub fn demonstrate(tutoring: &Tutoring, seed: u64, threads: usize) -> Result<Vec<Demonstration>> {
-    let all = demonstrate_with(tutoring, seed, threads, &|_, _| ())?;
+    demonstrate_while(tutoring, seed, threads, &|| Ok::<(), Error>(()))
+}
+
+/// The same, as long as `go_on`, which is asked before each sample, finds nothing against it; an error of it ends everything.
+///
+/// # Errors
+/// As [`demonstrate`], and those of `go_on`.
+pub fn demonstrate_while<E: From<Error> + Send>(
+    tutoring: &Tutoring,
+    seed: u64,
+    threads: usize,
+    go_on: &(dyn Fn() -> std::result::Result<(), E> + Sync),
+) -> std::result::Result<Vec<Demonstration>, E> {
+    let all = demonstrations(tutoring, seed, threads, &|_, _| go_on())?;
     Ok(all.into_iter().map(|(demonstration, _)| demonstration).collect())
 }
 
@@ -98,15 +111,25 @@ pub fn demonstrate_with<T: Send>(
     threads: usize,
     look: &(dyn Fn(&Stage, &[f64]) -> T + Sync),
 ) -> Result<Vec<(Demonstration, Vec<T>)>> {
+    demonstrations(tutoring, seed, threads, &|stage, sensed| Ok::<T, Error>(look(stage, sensed)))
+}
+
+/// Gives them all; an error of `look` ends everything.
+fn demonstrations<T: Send, E: From<Error> + Send>(
+    tutoring: &Tutoring,
+    seed: u64,
+    threads: usize,
+    look: &(impl Fn(&Stage, &[f64]) -> std::result::Result<T, E> + Sync),
+) -> std::result::Result<Vec<(Demonstration, Vec<T>)>, E> {
     let Tutoring { sequences, samples, placement, .. } = tutoring;
     for (what, count) in [("the number of demonstrations", *sequences), ("samples of a demonstration", *samples)] {
         if count == 0 {
-            return Err(Error::Setting { what, found: "0".to_owned(), needed: "at least 1" });
+            return Err(Error::Setting { what, found: "0".to_owned(), needed: "at least 1" }.into());
         }
     }
     if !(0.0..=0.02).contains(placement) {
         let found = format!("{placement} m");
-        return Err(Error::Setting { what: "the placement's error", found, needed: "0 to 0.02 m" });
+        return Err(Error::Setting { what: "the placement's error", found, needed: "0 to 0.02 m" }.into());
     }
     let robot = nao::load_one_armed()?;
     side_by_side(*sequences, threads, |sequence, _| demonstration(tutoring, &robot, seed, sequence, look))
@@ -126,13 +149,13 @@ pub fn dataset(demonstrations: &[Demonstration]) -> Result<Dataset> {
 }
 
 /// Gives one demonstration.
-fn demonstration<T>(
+fn demonstration<T, E: From<Error>>(
     tutoring: &Tutoring,
     robot: &Robot,
     seed: u64,
     sequence: usize,
-    look: &dyn Fn(&Stage, &[f64]) -> T,
-) -> Result<(Demonstration, Vec<T>)> {
+    look: &impl Fn(&Stage, &[f64]) -> std::result::Result<T, E>,
+) -> std::result::Result<(Demonstration, Vec<T>), E> {
     let mut random = stream(seed, Purpose::Demonstrations, sequence as u64);
     let position = sequence % POSITIONS.len();
     let y = POSITIONS[position] + random.random_range(-1.0..1.0) * tutoring.placement;
@@ -150,7 +173,7 @@ fn demonstration<T>(
         let noise = [HEAD_NOISE, HEAD_NOISE, ARM_NOISE, ARM_NOISE, ARM_NOISE, ARM_NOISE];
         let sensed: Vec<f64> =
             stage.angles().iter().zip(noise).map(|(angle, noise)| angle + noise * normal(&mut random)).collect();
-        seen.push(look(&stage, &sensed));
+        seen.push(look(&stage, &sensed)?);
         samples.extend(sensed);
         for step in 1..=steps {
             stage.step(&path.at((sample as f64 + step as f64 / steps as f64) * PERIOD));

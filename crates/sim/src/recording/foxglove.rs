@@ -2,11 +2,11 @@
 //!
 //! Both are protocol buffers. Foxglove reads them also as JSON; rerun does not.
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::Links;
 use super::wire::Message;
-use crate::world::scene::{Body, Part, Scene, Shape};
+use crate::world::scene::{Body, Form, Primitive, Scene};
 
 /// The frame that all others stand in.
 pub const WORLD: &str = "world";
@@ -54,54 +54,28 @@ fn timestamp(time: u64, out: &mut Message) {
     out.integer(2, time % 1_000_000_000);
 }
 
-/// The body's shape; the fields are 8 cubes, 9 spheres, 10 cylinders.
+/// The body's forms; the fields are 8 cubes, 9 spheres, 10 cylinders.
 fn primitives(body: &Body, entity: &mut Message) {
-    let place = body.world_from_shape;
-    let color = color(body.part);
-    match &body.shape {
-        Shape::Cuboid { half_extents: [x, y, z] } => {
-            entity.message(8, |out| primitive(place, Vector3::new(*x, *y, *z) * 2.0, color, out));
-        }
-        Shape::Sphere { radius } => {
-            entity.message(9, |out| primitive(place, Vector3::repeat(2.0 * radius), color, out));
-        }
-        Shape::Capsule { a, b, radius } => {
-            for end in [a, b] {
-                let place = place * Translation3::from(end.coords);
-                entity.message(9, |out| primitive(place, Vector3::repeat(2.0 * radius), color, out));
+    let color = body.part.colour();
+    for Primitive { form, size, world_from_form } in body.primitives() {
+        let field = match form {
+            Form::Cuboid => 8,
+            Form::Sphere => 9,
+            Form::Cylinder => 10,
+        };
+        entity.message(field, |out| {
+            out.message(1, |out| pose(world_from_form, out));
+            out.message(2, |out| vector(size.into(), out));
+            if form == Form::Cylinder {
+                // As wide at the bottom as at the top.
+                out.double(3, 1.0);
+                out.double(4, 1.0);
+                out.message(5, |out| rgba(color, out));
+            } else {
+                out.message(3, |out| rgba(color, out));
             }
-            let (along, length) = cylinder_from_axis(a, b);
-            entity.message(10, |out| cylinder(place * along, *radius, length, color, out));
-        }
-        Shape::Cylinder { half_length, radius } => {
-            entity.message(10, |out| cylinder(place, *radius, 2.0 * half_length, color, out));
-        }
+        });
     }
-}
-
-/// A cylinder around its z axis, as wide at the top as at the bottom.
-fn cylinder(place: Isometry3<f64>, radius: f64, length: f64, color: [f64; 4], out: &mut Message) {
-    out.message(1, |out| pose(place, out));
-    out.message(2, |out| vector(Vector3::new(2.0 * radius, 2.0 * radius, length), out));
-    out.double(3, 1.0);
-    out.double(4, 1.0);
-    out.message(5, |out| rgba(color, out));
-}
-
-/// Where a cylinder around its z axis stands that reaches from `a` to `b`, and how long it is.
-fn cylinder_from_axis(a: &Point3<f64>, b: &Point3<f64>) -> (Isometry3<f64>, f64) {
-    let axis = b - a;
-    // Opposite to z, any half turn will do.
-    let rotation = UnitQuaternion::rotation_between(&Vector3::z(), &axis)
-        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
-    (Isometry3::from_parts((a + axis / 2.0).coords.into(), rotation), axis.norm())
-}
-
-/// A cube or a sphere: pose, size, colour.
-fn primitive(place: Isometry3<f64>, size: Vector3<f64>, color: [f64; 4], out: &mut Message) {
-    out.message(1, |out| pose(place, out));
-    out.message(2, |out| vector(size, out));
-    out.message(3, |out| rgba(color, out));
 }
 
 fn pose(place: Isometry3<f64>, out: &mut Message) {
@@ -125,34 +99,5 @@ fn quaternion(rotation: UnitQuaternion<f64>, out: &mut Message) {
 fn rgba(color: [f64; 4], out: &mut Message) {
     for (field, value) in (1..).zip(color) {
         out.double(field, value);
-    }
-}
-
-fn color(part: Part) -> [f64; 4] {
-    match part {
-        Part::Robot => [0.85, 0.86, 0.88, 1.0],
-        Part::Hand => [0.16, 0.40, 0.75, 1.0],
-        Part::OtherRobot => [0.55, 0.58, 0.62, 1.0],
-        Part::Object => [0.85, 0.15, 0.12, 1.0],
-        Part::Furniture => [0.70, 0.60, 0.46, 1.0],
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_cylinder_reaches_from_end_to_end_whatever_its_direction() {
-        let origin = Point3::new(0.1, -0.2, 0.3);
-        for direction in [[0.0, 0.0, 2.0], [0.0, 0.0, -2.0], [3.0, 0.0, 0.0], [1.0, -2.0, 0.5]] {
-            let other = origin + Vector3::from(direction);
-            let (place, length) = cylinder_from_axis(&origin, &other);
-            let ends = [-0.5, 0.5].map(|half| place * Point3::new(0.0, 0.0, half * length));
-            assert!((ends[0] - origin).norm() < 1e-12 && (ends[1] - other).norm() < 1e-12, "{direction:?}: {ends:?}");
-        }
-        // A capsule without length is a sphere; its cylinder has no direction, but numbers.
-        let (place, length) = cylinder_from_axis(&origin, &origin);
-        assert!(length == 0.0 && place.rotation.coords.iter().all(|value| value.is_finite()));
     }
 }

@@ -92,7 +92,7 @@ fn verdict(collected: &Collected, best: Option<&Best>) -> Vec<Block> {
         let shown = names.iter().take(8).map(String::as_str).collect::<Vec<_>>().join("; ");
         if names.len() > 8 { format!("{shown}; and {} more", names.len() - 8) } else { shown }
     };
-    let mut blocks = vec![Block::Text(text)];
+    let mut blocks = vec![Block::Verdict(text)];
     if !as_good.is_empty() {
         blocks.push(Block::Text(format!(
             "Not to be told from it at 5 % (Welch's t-test, Holm's correction): {}.",
@@ -151,12 +151,13 @@ fn sheet_of_tests(collected: &Collected, measure: &Measure) -> Option<Block> {
         let p = |p: f64| if p < 1e-3 { format!("{p:.1e}") } else { format!("{p:.3}") };
         vec![
             format!("{} against {}", collected.called(*a), collected.called(*b)),
+            // Second, so that a phone shows it.
+            if *corrected < 0.05 { "yes" } else { "no" }.to_owned(),
             short(test.difference),
             format!("{:.2}", test.t),
             format!("{:.1}", test.degrees),
             p(test.p),
             p(*corrected),
-            if *corrected < 0.05 { "yes" } else { "no" }.to_owned(),
         ]
     };
     let count = pairs.len();
@@ -166,7 +167,7 @@ fn sheet_of_tests(collected: &Collected, measure: &Measure) -> Option<Block> {
     }
     Some(Block::Sheet(Sheet {
         caption: measure.label.to_owned(),
-        head: ["settings", "difference", "t", "degrees", "p", "corrected p", "differ at 5 %"]
+        head: ["settings", "differ at 5 %", "difference", "t", "degrees", "p", "corrected p"]
             .map(String::from)
             .to_vec(),
         rows: pairs.iter().take(TESTS).map(row).collect(),

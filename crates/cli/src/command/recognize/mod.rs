@@ -3,6 +3,7 @@
 
 mod online;
 mod regression;
+mod showing;
 
 pub use regression::RegressionArguments;
 

@@ -11,15 +11,21 @@ use scrnn::error_regression::{ErrorRegressionOptions, Regression};
 use serde_json::json;
 
 use super::regression::RegressionArguments;
+use super::showing::Shown;
 use crate::args::{Part, Shared};
 use crate::output::{self, Reader};
+use crate::watching::Watch;
 use scrnn_data::{self as files, Field};
+use scrnn_pages::live::Heading;
 use scrnn_report::Table;
 use scrnn_run::failure::{Ending, Failure, Result};
 use scrnn_run::familiar::{self, Range, Unfamiliar, is_far};
-use scrnn_run::following::{self, Begin, Followed, Following, Latency, follow};
+use scrnn_run::following::{self, Begin, Followed, Following, Latency, follow_watched};
 use scrnn_run::stream::{Arrival, Stream};
 use scrnn_run::trained::Trained;
+
+/// Seconds between two samples of a file that does not say, where they are watched.
+const PERIOD: f64 = 0.1;
 
 /// How to follow.
 #[derive(Debug, Args)]
@@ -51,6 +57,8 @@ pub struct Online {
     /// In the lines of a stream, show the whole window, its contexts and the number of updates as well
     #[arg(long, requires_all = ["online", "json"])]
     full: bool,
+    #[command(flatten)]
+    watch: Watch,
 }
 
 impl Online {
@@ -85,6 +93,14 @@ impl Online {
         }
     }
 
+    /// Begins to show what happens, if that is wanted. `period` is that of the samples; a stream comes at its own pace.
+    fn showing(&self, trained: &Trained, what: &str, period: Option<f64>) -> Result<Shown> {
+        let (title, channels) = (format!("Following {what}"), &trained.checkpoint.channels);
+        let scaling = &trained.checkpoint.scaling;
+        let heading = Heading { title: &title, channels, scaling, unit: "samples", pace: None };
+        Ok(Shown::on(self.watch.start(&heading, period)?))
+    }
+
     /// Begins to follow.
     fn following(&self, how: &How<'_>, trained: &Arc<Trained>, engine: &Engine) -> Result<Following> {
         let options = self.options(how, trained)?;
@@ -115,15 +131,23 @@ pub fn run(
         if out.is_some() || !online.at.is_empty() {
             return Err(Failure::input("--out and --at do not go with a stream", "it is printed as it comes"));
         }
+        if online.watch.has_speed() {
+            return Err(Failure::input("--speed does not go with a stream", "it comes at its own pace"));
+        }
         return stream(online, how, &trained, as_json, shared);
     }
-    let set = files::read_all(&[data], &part.of(data, trained.selection()))?.data;
-    let data = trained.fitted_aloud(set, data, shared)?;
+    let read = files::read_all(&[data], &part.of(data, trained.selection()))?;
+    let name = data.display().to_string();
+    let data = trained.fitted_aloud(read.data, data, shared)?;
     let engine = shared.engine()?;
     let mut followed = Vec::new();
+    let mut shown = online.showing(&trained, &name, Some(read.period.unwrap_or(PERIOD)))?;
     for sequence in data.sequences() {
-        followed.push(follow(online.following(how, &trained, &engine)?, sequence, &online.at)?);
+        shown.begin(&sequence.name);
+        let watch = &mut |session: &Following, sample: &[f64], done: &Regression| shown.sample(session, sample, done);
+        followed.push(follow_watched(online.following(how, &trained, &engine)?, sequence, &online.at, watch)?);
     }
+    shown.finish();
     for one in followed.iter().filter(|one| one.steps.last().is_some_and(|step| step.locked == Some(false))) {
         shared.say(format_args!(
             "{} was not found: the window at its end is less likely than what was learned, by more than a nat per step and channel",
@@ -152,6 +176,7 @@ fn stream(online: &Online, how: &How<'_>, trained: &Arc<Trained>, as_json: bool,
     let known = familiar::learned(trained);
     let mut locked = None;
     let mut reader = Reader::Listens;
+    let mut shown = online.showing(trained, "the standard input", None)?;
     if !as_json {
         reader = output::offer(&format!("sample,iterations,milliseconds,{}\n", channels.join(",")))?;
     }
@@ -162,6 +187,7 @@ fn stream(online: &Online, how: &How<'_>, trained: &Arc<Trained>, as_json: bool,
             Some(Arrival::Gap) => {
                 if session.taken() > 0 {
                     session = session.begin_anew()?;
+                    shown.begin("another sequence");
                 }
                 continue;
             }
@@ -184,7 +210,9 @@ fn stream(online: &Online, how: &How<'_>, trained: &Arc<Trained>, as_json: bool,
             (true, false) => output::offer_json_line(&session.answer(&done))?,
             (false, _) => output::offer(&row(&session, &done))?,
         };
+        shown.sample(&session, &sample, &done);
     }
+    shown.finish();
     if lines.is_unfinished() {
         shared.say("the last line of the stream has no end: it is no sample");
     }

@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use scrnn::analysis::excursions::Side;
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions};
 use scrnn::streams::Purpose;
 use scrnn_sim::interact::{Branch, ControlStep, Controller, Followed, Outcome, follow, with_own_arm};
-use scrnn_sim::interact::{CHANNELS, Interaction, InteractionOptions, letters, parse_order, random_order};
+use scrnn_sim::interact::{CHANNELS, Interaction, InteractionOptions, PERIOD, letters, parse_order, random_order};
 use serde::Serialize;
 use serde_json::json;
 
@@ -16,7 +17,9 @@ use crate::command::recognize::RegressionArguments;
 use crate::command::view;
 use crate::output;
 use crate::outputs::check_distinct;
+use crate::watching::Watch;
 use scrnn_data::{self as files, Field};
+use scrnn_pages::live::{Frame, Heading, Sample};
 use scrnn_report::Table;
 use scrnn_run::failure::{Ending, Failure, Result};
 use scrnn_run::following::Latency;
@@ -33,7 +36,8 @@ use scrnn_tasks::interact::BRANCHES;
 #[command(after_help = "\
 Examples:
   scrnn simulate interact runs/interaction_wide --order RLLLR --initial-state LLRRL
-  scrnn simulate interact runs/interaction_wide --order RLLLR --initial-state LLRRL --ers --mcap world.mcap")]
+  scrnn simulate interact runs/interaction_wide --order RLLLR --initial-state LLRRL --ers --mcap world.mcap
+  scrnn simulate interact runs/interaction_wide --ers --watch        in a browser, as it goes on")]
 pub struct Arguments {
     /// A run folder or a checkpoint file
     run: PathBuf,
@@ -69,6 +73,8 @@ pub struct Arguments {
     /// Write a page that plays what happened, in any browser
     #[arg(long, value_name = "PAGE.html")]
     view: Option<PathBuf>,
+    #[command(flatten)]
+    watch: Watch,
     /// Print a JSON object
     #[arg(long)]
     json: bool,
@@ -106,6 +112,10 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         Some(_) => Some(Film::new(&[("run", &arguments.run.display().to_string())])?),
         None => None,
     };
+    let (channels, scaling) = (&checkpoint.channels, &checkpoint.scaling);
+    let heading = Heading { title: "Two robots interact", channels, scaling, unit: "s", pace: None };
+    let mut shown = arguments.watch.start(&heading, Some(1.0))?;
+    let mut begun = 0.0;
     let engine = shared.engine()?;
     let mut trials = Vec::new();
     for trial in 0..u64::from(arguments.trials) {
@@ -125,18 +135,31 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
             deadline.sample(|go_on| regression.observe(sample, go_on))
         };
         let watch = |interaction: &Interaction, step: &ControlStep, _: &ErrorRegression| -> Result<()> {
-            let Some(film) = film.as_mut() else { return Ok(()) };
-            let scaling = &checkpoint.scaling;
+            if film.is_none() && shown.is_none() {
+                return Ok(());
+            }
             let raw = |y: [f64; 8]| (0..8).map(|i| scaling.to_raw(i, y[i])).collect::<Vec<_>>();
             let mean = step.predicted.map(raw);
             let variance: Vec<f64> =
                 step.variance.iter().enumerate().map(|(i, &v)| scaling.variance_to_raw(i, v)).collect();
+            if let Some(shown) = &mut shown {
+                let sample =
+                    Sample { sensed: &step.sensed, mean: mean.as_deref().unwrap_or_default(), variance: &variance };
+                let (scene, event) = (interaction.scene(), happening(interaction));
+                let time = begun + interaction.time();
+                shown.frame(&Frame { time, scene: Some(&scene), sample: Some(sample), event: event.as_deref() });
+            }
+            let Some(film) = film.as_mut() else { return Ok(()) };
             let variance = Some(variance.as_slice()).filter(|variance| !variance.is_empty());
             Ok(film.frame(interaction, &step.sensed, mean.as_deref().map(|mean| (mean, variance)))?)
         };
         let followed = follow(&controller, &options, &mut interaction, observe, watch)?;
+        begun += interaction.time() + PERIOD;
         let (order, branches) = (letters(&order), followed.branches.clone());
         trials.push(Trial { order, initial_state, branches, latency: deadline.latency(), followed });
+    }
+    if let Some(shown) = shown {
+        shown.finish();
     }
     if let Some(film) = film {
         let bytes = film.finish()?;
@@ -158,6 +181,15 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         output::print(&told(&trials))?;
     }
     Ok(Ending::Done)
+}
+
+/// What happens at this sample, in words.
+fn happening(interaction: &Interaction) -> Option<String> {
+    if let Some(collision) = interaction.collision() {
+        return Some(format!("collision with {collision:?}").to_lowercase());
+    }
+    let (branch, side) = interaction.branching()?;
+    Some(format!("branching {branch} to the {}", if side == Side::Left { "left" } else { "right" }))
 }
 
 impl Arguments {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::Args;
-use scrnn_sim::reach::agent::{NetworkDriver, Noise, Performance, Snapshot, perform};
+use scrnn_sim::reach::agent::{Decision, NetworkDriver, Noise, Performance, Snapshot, perform};
 use scrnn_sim::reach::channels::REACHING;
 use scrnn_sim::reach::recording::ReachingRecording;
 use scrnn_sim::reach::stage::{CYCLE, POSITIONS};
@@ -17,10 +17,15 @@ use crate::args::Shared;
 use crate::command::view;
 use crate::output;
 use crate::outputs::check_distinct;
+use crate::watching::{Watch, Watching};
 use scrnn_data as files;
+use scrnn_pages::live::{Frame, Heading, Sample};
 use scrnn_report::Table;
 use scrnn_run::failure::{Ending, Failure, Result};
 use scrnn_run::trained::Trained;
+
+/// Seconds in the world between two pictures on a page.
+const PICTURES: f64 = 0.05;
 
 /// Let a network that learned to reach touch the sphere
 ///
@@ -34,7 +39,8 @@ Examples:
   scrnn train assets/experiments/reaching_fast.toml
   scrnn simulate reach runs/reaching_fast --position 2
   scrnn simulate reach runs/reaching_fast --position -0.105 --cycles 30 --mcap between.mcap
-  scrnn simulate reach runs/reaching_fast --position 1 --shift-at 60 --to 3 --json")]
+  scrnn simulate reach runs/reaching_fast --position 1 --shift-at 60 --to 3 --json
+  scrnn simulate reach runs/reaching_fast --watch                    in a browser, as it goes on")]
 pub struct Arguments {
     /// A run folder or a checkpoint file
     run: PathBuf,
@@ -65,6 +71,8 @@ pub struct Arguments {
     /// Write a page that plays what happened, in any browser
     #[arg(long, value_name = "PAGE.html")]
     view: Option<PathBuf>,
+    #[command(flatten)]
+    watch: Watch,
     /// Print a JSON object
     #[arg(long)]
     json: bool,
@@ -147,13 +155,20 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         Some(_) => Some(recording(&trained, arguments)?),
         None => None,
     };
+    let mut shown = Shown::start(arguments, &trained)?;
     let mut look = |snapshot: &Snapshot<'_>| -> Result<()> {
+        if let Some(shown) = &mut shown {
+            shown.snapshot(snapshot);
+        }
         match &mut recording {
             Some(recording) => Ok(recording.snapshot(snapshot)?),
             None => Ok(()),
         }
     };
     let performed = perform(&performance, &mut driver, &mut look)?;
+    if let Some(shown) = shown {
+        shown.watching.finish();
+    }
     if let Some(recording) = recording {
         let bytes = recording.finish()?.into_inner();
         if let Some(path) = &arguments.mcap {
@@ -181,6 +196,47 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
         false => output::print(&told(&result))?,
     }
     Ok(Ending::Done)
+}
+
+/// A performance on a page, as it goes on.
+#[derive(Debug)]
+struct Shown {
+    watching: Watching,
+    /// What was decided on the last sample, and so what the next one was predicted as.
+    expected: Decision,
+    /// Pictures that were taken.
+    pictures: u64,
+}
+
+impl Shown {
+    fn start(arguments: &Arguments, trained: &Trained) -> Result<Option<Self>> {
+        let (channels, scaling) = (&trained.checkpoint.channels, &trained.checkpoint.scaling);
+        let heading = Heading { title: "NAO reaches", channels, scaling, unit: "s", pace: None };
+        let watching = arguments.watch.start(&heading, Some(1.0))?;
+        Ok(watching.map(|watching| Self { watching, expected: Decision::default(), pictures: 0 }))
+    }
+
+    fn snapshot(&mut self, snapshot: &Snapshot<'_>) {
+        let time = snapshot.stage.world().time();
+        let is_due = time + 1e-9 >= self.pictures as f64 * PICTURES;
+        if !is_due && snapshot.decision.is_none() && snapshot.contact.is_none() {
+            return;
+        }
+        if is_due {
+            self.pictures += 1;
+        }
+        let event = snapshot.contact.map(|cycle| format!("touch {}", cycle + 1));
+        let sample = snapshot.decision.map(|(sensed, _)| Sample {
+            sensed,
+            mean: &self.expected.mean,
+            variance: &self.expected.variance,
+        });
+        let scene = snapshot.stage.world().scene();
+        self.watching.frame(&Frame { time, scene: Some(&scene), sample, event: event.as_deref() });
+        if let Some((_, decision)) = snapshot.decision {
+            self.expected = decision.clone();
+        }
+    }
 }
 
 fn recording(trained: &Trained, arguments: &Arguments) -> Result<ReachingRecording<Cursor<Vec<u8>>>> {
