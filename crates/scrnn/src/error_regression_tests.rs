@@ -238,7 +238,8 @@ fn a_control_loop_can_stop_it_at_any_iteration() {
     let network = network(1, true, fast_and_slow());
     // L-BFGS asks once more: before it looks at where it begins.
     for (options, iterations) in [(ErrorRegressionOptions::adam(3), 3), (ErrorRegressionOptions::new(3), 2)] {
-        let options = ErrorRegressionOptions { iterations: 50, guard: Some(false), ..options };
+        let (tolerance, guard) = (Some(0.0), Some(false));
+        let options = ErrorRegressionOptions { iterations: 50, tolerance, guard, ..options };
         let mut regression = ErrorRegression::new(&network, &u0(&network), options, &Engine::serial()).unwrap();
         observe_all(&mut regression, 5);
         let mut asked = 0;
@@ -247,7 +248,8 @@ fn a_control_loop_can_stop_it_at_any_iteration() {
             asked <= 3
         };
         let done = regression.observe(&sample(5), &mut go_on).unwrap();
-        assert_eq!((done.iterations, done.passes, done.steps), (iterations, 3, 5));
+        assert_eq!((done.iterations, done.steps), (iterations, 5));
+        assert!((2..=3).contains(&done.passes), "{done:?}");
         assert!(done.ln_likelihood[1] > done.ln_likelihood[0]);
         let tail = regression.tail().to_vec();
         let done = regression.observe(&sample(6), &mut || false).unwrap();
@@ -264,8 +266,8 @@ fn now(regression: &mut ErrorRegression) -> f64 {
 #[test]
 fn the_best_state_that_was_met_is_kept_where_it_is_asked_for() {
     let network = network(2, true, fast_and_slow());
-    for ascent in [Ascent::Momentum { rate: 0.3, momentum: 0.9 }, Ascent::Adam { rate: 0.8 }] {
-        let options = ErrorRegressionOptions { ascent, window: 10, ..ErrorRegressionOptions::new(3) };
+    for ascent in [Ascent::Momentum { rate: 100.0, momentum: 0.9 }, Ascent::Adam { rate: 1.0 }] {
+        let options = ErrorRegressionOptions { ascent, window: 30, ..ErrorRegressionOptions::new(3) };
         let run = |keep_best| {
             let options = ErrorRegressionOptions { keep_best, ..options.clone() };
             let mut regression = ErrorRegression::new(&network, &u0(&network), options, &Engine::serial()).unwrap();
@@ -282,9 +284,9 @@ fn the_best_state_that_was_met_is_kept_where_it_is_asked_for() {
             (worse, earlier)
         };
         let (worse, earlier) = run(false);
-        assert!(worse > 5 && earlier == 0, "{ascent:?}: at this rate the last step is worse {worse} times");
+        assert!(worse > 0 && earlier == 0, "{ascent:?}: at this rate the last step is worse {worse} times");
         let (worse, earlier) = run(true);
-        assert!(worse == 0 && earlier > 5, "{ascent:?}: {worse} worse, {earlier} kept from before");
+        assert!(worse == 0 && earlier > 0, "{ascent:?}: {worse} worse, {earlier} kept from before");
     }
 }
 
@@ -341,7 +343,7 @@ fn lbfgs_never_leads_downhill_whatever_is_missing_masked_or_skipped() {
     }
 }
 
-/// Waves of two channels whose frequency differs from one sequence to the next, with a little noise.
+/// Ellipses, run through slowly and quickly by turns, from anywhere, with a little noise.
 fn waves(count: usize, steps: usize, seed: u64) -> crate::dataset::Dataset {
     use crate::dataset::{Dataset, Sequence};
     use rand::RngExt as _;
@@ -353,7 +355,7 @@ fn waves(count: usize, steps: usize, seed: u64) -> crate::dataset::Dataset {
         for t in 0..steps {
             let angle: f64 = phase + frequency * t as f64;
             samples.push(0.6 * angle.sin() + random.random_range(-0.03..0.03));
-            samples.push(0.5 * (angle + 0.8).cos() * angle.sin() + random.random_range(-0.03..0.03));
+            samples.push(0.5 * angle.cos() + random.random_range(-0.03..0.03));
         }
         sequences.push(Sequence::new(format!("{s}"), 2, samples).unwrap());
     }
@@ -361,17 +363,17 @@ fn waves(count: usize, steps: usize, seed: u64) -> crate::dataset::Dataset {
 }
 
 /// A network that has learned such waves, and the mean of its initial states.
-fn trained(groups: Vec<Group>) -> (Network, Vec<f64>) {
+fn trained(groups: Vec<Group>, epochs: u64) -> (Network, Vec<f64>) {
     use crate::learning::{Adam, Learner, Optimiser, Plan};
     let topology = Topology::new(2, 1, groups, Prediction::MeanAndVariance { floor: 1e-4 }).unwrap();
     let (network, states) = initialize(&topology, 8, 3);
     let plan = Plan::with(|it| {
-        it.epochs = 400;
+        it.epochs = epochs;
         it.optimiser = Optimiser::Adam(Adam::with(|it| it.rate = 1e-2));
     });
     let data = waves(8, 120, 1);
     let mut learner = Learner::new(network, states, &data, plan, &Engine::serial()).unwrap();
-    learner.run(&mut |_: &crate::learning::EpochReport, _: &Learner| std::ops::ControlFlow::Continue(()));
+    let _ = learner.run(&mut |_: &crate::learning::EpochReport, _: &Learner| std::ops::ControlFlow::Continue(()));
     (learner.network().clone(), learner.initial_states().mean().to_vec())
 }
 
@@ -424,27 +426,29 @@ fn came((network, state): &(Network, Vec<f64>), options: &ErrorRegressionOptions
 }
 
 #[test]
-fn ten_steps_of_lbfgs_come_to_what_a_hundred_of_adam_do() {
-    for groups in [one_group(), slow_alone_moves()] {
-        let trained = trained(groups.clone());
-        let with = |options: ErrorRegressionOptions| {
-            came(&trained, &ErrorRegressionOptions { window: 30, guard: Some(false), ..options })
+fn a_dozen_steps_of_lbfgs_come_to_what_a_hundred_of_adam_do() {
+    // What holds L-BFGS back costs a little where slow units alone say what comes.
+    for (groups, epochs, least) in
+        [(one_group(), 1000, 0.0), (one_group(), 3000, -1e-3), (slow_alone_moves(), 3000, -3e-3)]
+    {
+        let trained = trained(groups, epochs);
+        let with = |ascent, iterations| {
+            let (window, guard) = (30, Some(false));
+            came(
+                &trained,
+                &ErrorRegressionOptions { ascent, iterations, window, guard, ..ErrorRegressionOptions::new(2) },
+            )
         };
-        let adam = with(ErrorRegressionOptions {
-            ascent: Ascent::Adam { rate: 0.01 },
-            iterations: 100,
-            ..ErrorRegressionOptions::new(2)
-        });
-        let own = with(ErrorRegressionOptions::new(2));
-        eprintln!("{groups:?}: {own:?}, {adam:?}");
-        assert!(own.ln_likelihood > adam.ln_likelihood - 1e-3, "{groups:?}: {own:?}, {adam:?}");
-        assert!(own.passes < 12.0 && adam.passes == 100.0, "{own:?}");
+        let adam = with(Ascent::Adam { rate: 0.01 }, 100);
+        let own = with(ErrorRegressionOptions::new(2).ascent, 12);
+        assert!(own.ln_likelihood > adam.ln_likelihood + least, "{epochs} epochs: {own:?}, {adam:?}");
+        assert!(own.passes < 13.0 && adam.passes == 100.0, "{own:?}");
     }
 }
 
 #[test]
 fn pairs_that_live_on_are_worth_having() {
-    let (network, state) = trained(one_group());
+    let (network, state) = trained(one_group(), 3000);
     let run = |forgets: bool| {
         let options = ErrorRegressionOptions { window: 30, guard: Some(false), ..ErrorRegressionOptions::new(2) };
         let mut regression = ErrorRegression::new(&network, &state, options, &Engine::serial()).unwrap();
@@ -463,50 +467,60 @@ fn pairs_that_live_on_are_worth_having() {
 }
 
 #[test]
-fn the_default_does_no_harm_where_the_open_loop_follows_by_itself() {
+fn the_default_does_no_harm_and_helps_where_the_closed_loop_follows() {
     let quiet = ErrorRegressionOptions { iterations: 0, ..ErrorRegressionOptions::new(2) };
-    for groups in [one_group(), slow_alone_moves()] {
-        let trained = trained(groups.clone());
+    for (groups, epochs) in
+        [(one_group(), 1000), (slow_alone_moves(), 1000), (one_group(), 3000), (slow_alone_moves(), 3000)]
+    {
+        let (alone, trained) = (groups.len() == 1, trained(groups, epochs));
         let (on, off) = (came(&trained, &ErrorRegressionOptions::new(2)), came(&trained, &quiet));
-        let adam = came(&trained, &ErrorRegressionOptions::adam(2));
-        eprintln!("{groups:?}: on {on:?}, off {off:?}, adam {adam:?}");
+        let all = format!("one group: {alone}, {epochs} epochs: on {on:?}, off {off:?}");
         for k in 0..2 {
-            assert!(on.errors[k] < 1.05 * off.errors[k], "{groups:?}: on {on:?}, off {off:?}");
+            assert!(on.errors[k] < 1.02 * off.errors[k], "{all}");
         }
-        if groups.len() == 1 {
-            // What this is about: the default before.
-            assert!(adam.errors[0] > 1.5 * off.errors[0], "{groups:?}: Adam {adam:?}, off {off:?}");
+        if epochs == 3000 {
+            assert!(on.errors[1] < 0.5 * off.errors[1], "{all}");
+        } else if alone {
+            // What this is about: the default before, and that it is the guard that helps.
+            assert!(on.given_up > 100, "{all}");
+            let adam = came(&trained, &ErrorRegressionOptions::adam(2));
+            assert!(adam.errors[0] > 1.2 * off.errors[0], "{all}, Adam {adam:?}");
         }
     }
 }
 
 #[test]
-fn a_guard_leaves_the_network_as_it_is_without_regression() {
+fn where_regression_is_given_up_the_network_is_as_it_would_be_without() {
     let network = network(2, true, fast_and_slow());
-    // Steps so large that no window gets better.
+    // Steps so large that many windows get worse.
     let options = ErrorRegressionOptions {
-        ascent: Ascent::Adam { rate: 50.0 },
+        ascent: Ascent::Adam { rate: 30.0 },
         guard: Some(true),
         window: 8,
         ahead: 4,
         ..ErrorRegressionOptions::new(3)
     };
-    let run = |iterations| {
+    let new = |iterations| {
         let options = ErrorRegressionOptions { iterations, ..options.clone() };
-        let mut regression = ErrorRegression::new(&network, &u0(&network), options, &Engine::serial()).unwrap();
-        let (mut told, mut given_up) = (Vec::new(), 0);
-        for t in 0..40 {
-            let done = regression.observe(&gapped(t), &mut || true).unwrap();
-            given_up += usize::from(done.given_up);
-            told.extend([0, 4].map(|k| regression.forecast_mean(k).unwrap().to_vec()));
-            told.push(regression.variance().to_vec());
-            told.push(regression.tail().to_vec());
-        }
-        (told, given_up)
+        ErrorRegression::new(&network, &u0(&network), options, &Engine::serial()).unwrap()
     };
-    let ((with, given_up), (without, _)) = (run(3), run(0));
-    assert_eq!(given_up, 38);
-    assert_eq!(with, without);
+    let (mut guarded, mut without) = (new(10), new(0));
+    let mut counts = [0; 2];
+    for t in 0..60 {
+        let done = guarded.observe(&gapped(t), &mut || true).unwrap();
+        without.observe(&gapped(t), &mut || true).unwrap();
+        let told = |it: &ErrorRegression| {
+            let ahead = (0..=4).flat_map(|k| it.forecast_mean(k).unwrap().to_vec());
+            let window =
+                (0..=it.window()).flat_map(|k| [it.smoothed_mean(k).unwrap(), it.context(k).unwrap()].concat());
+            ahead.chain(window).chain(it.variance().to_vec()).chain(it.tail().to_vec()).collect::<Vec<f64>>()
+        };
+        if done.passes > 0 {
+            assert_eq!(told(&guarded) == told(&without), done.given_up, "sample {t}");
+            counts[usize::from(done.given_up)] += 1;
+        }
+    }
+    assert!(counts.iter().all(|count| *count > 2), "{counts:?}");
 }
 
 #[test]
