@@ -127,3 +127,27 @@ fn after_the_first_epochs_two_threads_allocate_nothing_either() {
         assert!(count <= calls / 63 + 1, "{optimiser:?}: {count} allocations");
     }
 }
+
+#[test]
+fn a_thread_that_follows_with_the_gradient_allocates_nothing() {
+    let _alone = alone();
+    let engine = Engine::new(2, InstructionSet::best()).unwrap();
+    // One block, and 2 ms of work: the second thread follows.
+    let data = waves(3, 1500);
+    let topology = Topology::s_ctrnn(2, 64, 2.0).unwrap();
+    let (network, states) = initialize(&topology, 3, 1);
+    let plan = Plan::with(|it| {
+        it.epochs = 1000;
+        it.optimiser = Optimiser::Adam(Adam::default());
+    });
+    let mut learner = Learner::new(network, states, &data, plan, &engine).unwrap();
+    let _ = learner.run(&mut until(3));
+    let count = (1..=3).map(|nth| {
+        let region = Region::new(ALLOCATOR);
+        let _ = learner.run(&mut until(3 + 60 * nth));
+        region.change().allocations + region.change().reallocations
+    });
+    // The queue of the thread pool takes a block for each 63 calls.
+    let count = count.min().unwrap();
+    assert!(count <= 2, "{count} allocations");
+}
