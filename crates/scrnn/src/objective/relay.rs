@@ -204,17 +204,13 @@ impl<E: Element> Relay<E> {
 
     /// Takes a segment up, and frees its memory.
     fn take_up(&self, block: usize, segment: Segment<E>, gather: &impl Gather<E>) -> MutexGuard<'_, State<E>> {
-        let slot = &self.slots[block];
+        let taken = Taken { relay: self, block, segment };
         {
-            let mut total = slot.total.lock().unwrap_or_else(PoisonError::into_inner);
-            gather(block, &segment, &self.states(block), &mut total);
+            let mut total = self.slots[block].total.lock().unwrap_or_else(PoisonError::into_inner);
+            gather(block, &taken.segment, &self.states(block), &mut total);
         }
-        let mut state = self.lock();
-        let queue = &mut state.queues[block];
-        queue.free.push(segment.deltas);
-        queue.busy = false;
-        self.tell(&mut state);
-        state
+        drop(taken);
+        self.lock()
     }
 
     /// Wakes those that are to follow, before there is something to follow.
@@ -306,6 +302,24 @@ impl<E: Element> Drop for Open<'_, E> {
     }
 }
 
+/// A segment that somebody works on: whatever happens to it, its block does not wait for it for ever.
+struct Taken<'a, E: Element> {
+    relay: &'a Relay<E>,
+    block: usize,
+    segment: Segment<E>,
+}
+
+impl<E: Element> Drop for Taken<'_, E> {
+    fn drop(&mut self) {
+        let deltas = std::mem::replace(&mut self.segment.deltas, AVec::new(64));
+        let mut state = self.relay.lock();
+        let queue = &mut state.queues[self.block];
+        queue.free.push(deltas);
+        queue.busy = false;
+        self.relay.tell(&mut state);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -350,5 +364,26 @@ mod tests {
                 assert_eq!(gradients(threads, follows), [1_234_567.0; 3], "{threads} threads");
             }
         }
+    }
+
+    #[cfg(feature = "rayon")]
+    #[test]
+    fn a_panic_in_a_follower_ends_the_evaluation_and_does_not_hang_it() {
+        let mut relay = Relay::<f64>::new();
+        relay.prepare(1, Some(1));
+        relay.total(0).resize(1);
+        let gather = |_: usize, _: &Segment<f64>, _: &[f64], _: &mut Total<f64>| panic!("in a segment");
+        let run = |block: usize| {
+            let mut deltas = AVec::from_iter(64, [0.0]);
+            for _ in 0..8 {
+                relay.hand_over(block, 0..1, 0, &mut deltas, (1, 0), &gather);
+            }
+            relay.finish(block, &gather);
+        };
+        let engine = Engine::new(2, InstructionSet::best()).unwrap();
+        let ended = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            engine.for_each(&mut [(); 2], |()| relay.work(run, gather));
+        }));
+        assert!(ended.is_err());
     }
 }
