@@ -2,7 +2,7 @@
 
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::engine::{Engine, InstructionSet};
-use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions};
+use scrnn::error_regression::{Ascent, ErrorRegression, ErrorRegressionOptions};
 use scrnn::initialization::initialize;
 use scrnn::learning::{Adam, EpochReport, Lbfgs, Learner, Momentum, Optimiser, Plan, PriorStep};
 use scrnn::topology::{Group, Prediction, Topology};
@@ -17,19 +17,27 @@ fn a_control_step_of_error_regression_allocates_nothing() {
     let groups = vec![Group::fast(20, 2.0), Group::slow(7, 30.0)];
     let topology = Topology::new(2, 3, groups, Prediction::MeanAndVariance { floor: 0.0 }).unwrap();
     let (network, states) = initialize(&topology, 1, 1);
+    let momentum = Ascent::Momentum { rate: 1e-3, momentum: 0.9 };
     for set in InstructionSet::available() {
-        let options = ErrorRegressionOptions::with(2, |it| {
-            it.window = 9;
-        });
-        let mut regression =
-            ErrorRegression::new(&network, states.sequence(0), options, &Engine::new(1, set).unwrap()).unwrap();
-        let samples = wave(40);
-        let counted = allocation_counter::measure(|| {
-            for sample in samples.chunks(2) {
-                regression.observe(sample, &mut || true).unwrap();
-            }
-        });
-        assert_eq!((counted.count_total, regression.window()), (0, 9), "{set}");
+        // The default is L-BFGS, guarded.
+        for (ascent, all) in [(None, false), (Some(momentum), true), (Some(Ascent::Adam { rate: 0.05 }), false)] {
+            let options = ErrorRegressionOptions::with(2, |it| {
+                it.window = 9;
+                it.ascent = ascent.unwrap_or(it.ascent);
+                if all {
+                    (it.keep_best, it.tolerance, it.guard) = (true, Some(1e-3), Some(true));
+                }
+            });
+            let mut regression =
+                ErrorRegression::new(&network, states.sequence(0), options, &Engine::new(1, set).unwrap()).unwrap();
+            let samples = wave(40);
+            let counted = allocation_counter::measure(|| {
+                for sample in samples.chunks(2) {
+                    regression.observe(sample, &mut || true).unwrap();
+                }
+            });
+            assert_eq!((counted.count_total, regression.window()), (0, 9), "{set}, {ascent:?}");
+        }
     }
 }
 

@@ -181,7 +181,7 @@ pub fn simulate_interact(
             let message = format!("the network's channels are {}", checkpoint.channels.join(", "));
             return Err(Failure::input(message, format!("an interaction has {}", CHANNELS.join(", "))));
         }
-        let mut options = ErrorRegressionOptions::new(checkpoint.channels.len());
+        let mut options = ErrorRegressionOptions::adam(checkpoint.channels.len());
         (options.window, options.iterations) = (window, if ers { iterations } else { 0 });
         if let Some(rate) = rate {
             options.ascent = Ascent::Adam { rate };

@@ -15,6 +15,16 @@
 //! feeds back to itself. Inputs of the window's first xi steps are the means predicted before it, which stay as they were, or
 //! samples where there was no prediction yet.
 //!
+//! # Which ascent
+//!
+//! [`Ascent::Lbfgs`], the default, takes no step that does not lead uphill, knows the curvature from the samples before, and ends when nothing is
+//! left to gain. [`Ascent::Momentum`] is the thesis', [`Ascent::Adam`] has steps of one size; both end where their last step leads, unless
+//! [`ErrorRegressionOptions::keep_best`] is set.
+//!
+//! None of them can help where no state lets the closed loop follow the samples for a whole window, though the open loop
+//! predicts them well. [`ErrorRegressionOptions::guard`] runs the network without regression beside: where its predictions made the window
+//! more likely than the regression now does, it is its state from which the network goes on.
+//!
 //! # At the thesis' rate the ascent is chaotic
 //!
 //! alpha_reg is a fixed step, however steep the likelihood is. On trained networks with many context units the iterations do not
@@ -39,6 +49,7 @@ use crate::network::Network;
 use crate::packed::Packed;
 
 mod features;
+mod lbfgs;
 mod options;
 
 pub use options::{Ascent, ErrorRegressionOptions, Regression};
@@ -92,8 +103,13 @@ pub struct ErrorRegression {
     moves: Vec<bool>,
     first: Vec<f64>,
     second: Vec<f64>,
-    /// The tail before the last step.
+    /// The tail before the last step, and the best one.
     tail_before: Vec<f64>,
+    tail_best: Vec<f64>,
+    /// Pairs of L-BFGS; none for the other rules.
+    memory: Option<Box<lbfgs::Memory>>,
+    /// The same network without regression, where it is to be compared with.
+    open: Option<Box<ErrorRegression>>,
     /// v of the samples to come.
     next_variance: Vec<f64>,
 }
@@ -126,6 +142,18 @@ impl ErrorRegression {
         let zeros = |count: usize| AVec::from_iter(64, std::iter::repeat_n(0.0, count));
         let n_v = packed.n_out - n_y;
         let rows = window + 2 + options.ahead;
+        let moves: Vec<bool> = topology.per_unit(|group| group.learns_initial_state).collect();
+        let memory = match options.ascent {
+            Ascent::Lbfgs { memory } => Some(Box::new(lbfgs::Memory::new(&moves, memory))),
+            _ => None,
+        };
+        let open = match options.iterations > 0 && options.is_guarded() {
+            true => {
+                let without = ErrorRegressionOptions { iterations: 0, ahead: 0, ..options.clone() };
+                Some(Box::new(Self::new(network, initial_state, without, engine)?))
+            }
+            false => None,
+        };
         let mut regression = Self {
             internal: zeros(rows * packed.rows),
             states: zeros(rows * packed.state_stride),
@@ -143,10 +171,13 @@ impl ErrorRegression {
             drive: zeros(packed.rows),
             drive_with_input: zeros(packed.rows),
             outputs: zeros(packed.rows.max(packed.to_input.rows())),
-            moves: topology.per_unit(|group| group.learns_initial_state).collect(),
+            moves,
             first: vec![0.0; n_c],
             second: vec![0.0; n_c],
             tail_before: vec![0.0; n_c],
+            tail_best: vec![0.0; n_c],
+            memory,
+            open,
             next_variance: vec![0.0; (1 + options.ahead) * n_v],
             observed: 0,
             length: 0,
@@ -177,6 +208,9 @@ impl ErrorRegression {
             return Err(Error::Setting { what, found: value.to_string(), needed });
         }
         let mut done = Regression::default();
+        if let Some(open) = &mut self.open {
+            open.observe(sample, &mut || false)?;
+        }
         if self.observed >= self.delay {
             // The step that predicted this sample joins the window.
             if self.length == self.options.window {
@@ -267,6 +301,9 @@ impl ErrorRegression {
 
     /// Forgets the window's first step.
     fn slide(&mut self) {
+        if let Some(memory) = &mut self.memory {
+            memory.slide();
+        }
         let (packed, rows) = (&self.packed, self.length + 2);
         let n_v = packed.n_out - packed.n_y;
         self.internal.copy_within(packed.rows..rows * packed.rows, 0);
@@ -507,6 +544,30 @@ impl ErrorRegression {
         }
     }
 
+    /// Goes on from the state of the network without regression, if its predictions made the window more likely than it is now.
+    #[inline(always)]
+    fn compare<S: Simd>(&mut self, simd: S, done: &mut Regression) {
+        let Some(open) = &mut self.open else { return };
+        let (ln_likelihood, squared_error) = open.score(simd);
+        if done.passes == 0 || !ln_likelihood.is_finite() || ln_likelihood <= done.ln_likelihood[1] {
+            return;
+        }
+        // It looks no further ahead than the next sample, so its lists are as long or shorter.
+        for (own, open) in [
+            (&mut self.internal, &open.internal),
+            (&mut self.states, &open.states),
+            (&mut self.mean, &open.mean),
+            (&mut self.variance, &open.variance),
+            (&mut self.taken, &open.taken),
+        ] {
+            own[..open.len()].copy_from_slice(open);
+        }
+        (done.ln_likelihood[1], done.squared_error[1], done.given_up) = (ln_likelihood, squared_error, true);
+        if let Some(memory) = &mut self.memory {
+            memory.forget();
+        }
+    }
+
     /// Moves the tail; `iteration` counts from 0.
     #[inline(always)]
     fn move_tail(&mut self, iteration: usize) {
@@ -530,6 +591,8 @@ impl ErrorRegression {
                     self.first[i] = rate * g + momentum * self.first[i];
                     self.first[i]
                 }
+                // It has a way of its own, in `lbfgs`.
+                Ascent::Lbfgs { .. } => 0.0,
                 Ascent::Adam { rate } => {
                     self.first[i] = BETA.0 * self.first[i] + (1.0 - BETA.0) * g;
                     self.second[i] = BETA.1 * self.second[i] + (1.0 - BETA.1) * g * g;
@@ -591,47 +654,81 @@ impl WithSimd for Regress<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Regression {
         let Self { regression, go_on } = self;
-        regression.first.fill(0.0);
-        regression.second.fill(0.0);
         let (steps, values) = (regression.length, regression.values());
         let mut done = Regression { steps, values, ..Regression::default() };
-        let n_c = regression.packed.n_c;
-        while done.iterations < regression.options.iterations && go_on() {
-            regression.run_window(simd);
-            let (ln_likelihood, squared_error) = regression.score(simd);
+        match regression.memory.take() {
+            Some(mut memory) => {
+                regression.climb(simd, &mut memory, go_on, &mut done);
+                regression.memory = Some(memory);
+            }
+            None => regression.step_by_step(simd, go_on, &mut done),
+        }
+        regression.compare(simd, &mut done);
+        done
+    }
+}
+
+impl ErrorRegression {
+    /// The iterations of the rules that take each step, wherever it leads.
+    #[inline(always)]
+    fn step_by_step<S: Simd>(&mut self, simd: S, go_on: &mut dyn FnMut() -> bool, done: &mut Regression) {
+        self.first.fill(0.0);
+        self.second.fill(0.0);
+        let n_c = self.packed.n_c;
+        let tolerance = self.options.tolerance_of_a_step() * self.length as f64;
+        let (mut best, mut last) = ([f64::NEG_INFINITY, 0.0], f64::NAN);
+        let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
+        while done.iterations < self.options.iterations && go_on() {
+            self.run_window(simd);
+            let (ln_likelihood, squared_error) = self.score(simd);
             if done.iterations == 0 {
                 (done.ln_likelihood, done.squared_error) = ([ln_likelihood; 2], [squared_error; 2]);
             }
-            regression.run_back(simd);
-            let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
-            if !(ln_likelihood.is_finite() && finite(&regression.deltas[..n_c])) {
+            if self.options.keep_best && ln_likelihood > best[0] {
+                (best, done.kept) = ([ln_likelihood, squared_error], done.iterations);
+                self.tail_best.copy_from_slice(&self.internal[..n_c]);
+            }
+            if (ln_likelihood - last).abs() < tolerance {
+                done.converged = true;
+                break;
+            }
+            last = ln_likelihood;
+            self.run_back(simd);
+            done.passes += 1;
+            if !(ln_likelihood.is_finite() && finite(&self.deltas[..n_c])) {
                 done.diverged = true;
                 break;
             }
-            regression.tail_before.copy_from_slice(&regression.internal[..n_c]);
-            regression.move_tail(done.iterations);
+            self.tail_before.copy_from_slice(&self.internal[..n_c]);
+            self.move_tail(done.iterations);
             done.iterations += 1;
-            if !finite(&regression.internal[..n_c]) {
+            if !finite(&self.internal[..n_c]) {
                 done.diverged = true;
                 break;
             }
         }
         if done.iterations == 0 {
-            return done;
+            return;
         }
         if !done.diverged {
-            regression.run_window(simd);
-            (done.ln_likelihood[1], done.squared_error[1]) = regression.score(simd);
+            self.run_window(simd);
+            (done.ln_likelihood[1], done.squared_error[1]) = self.score(simd);
             done.diverged = !done.ln_likelihood[1].is_finite();
         }
         if done.diverged {
             // The tail before the last step had a finite score.
             done.iterations -= 1;
-            regression.internal[..n_c].copy_from_slice(&regression.tail_before);
-            regression.run_window(simd);
-            (done.ln_likelihood[1], done.squared_error[1]) = regression.score(simd);
+            self.internal[..n_c].copy_from_slice(&self.tail_before);
+            self.run_window(simd);
+            (done.ln_likelihood[1], done.squared_error[1]) = self.score(simd);
         }
-        done
+        if self.options.keep_best && best[0] > done.ln_likelihood[1] {
+            self.internal[..n_c].copy_from_slice(&self.tail_best);
+            self.run_window(simd);
+            (done.ln_likelihood[1], done.squared_error[1]) = (best[0], best[1]);
+        } else {
+            done.kept = done.iterations;
+        }
     }
 }
 

@@ -47,7 +47,7 @@ impl Material {
         subject.desk.at(|| "what is drawn".to_owned())?;
         let closed = subject.on_its_own(|s| s, SHOWN_LOOP, true)?.swap_remove(shown);
         let state = subject.states.sequence(subject.other());
-        let options = ErrorRegressionOptions::new(subject.data.channels().len());
+        let options = ErrorRegressionOptions::adam(subject.data.channels().len());
         let quiet = {
             let mut it = options.clone();
             it.iterations = 0;

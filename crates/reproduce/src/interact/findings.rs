@@ -46,7 +46,7 @@ impl Findings {
     /// Puts a network through everything. Only the thesis' conditions meet the world, only the wide one regresses.
     pub fn of(setting: &Setting, subject: &Subject<'_>, study: &Interact) -> Result<Self> {
         let state = subject.states.sequence(subject.other());
-        let default = ErrorRegressionOptions::new(subject.data.channels().len());
+        let default = ErrorRegressionOptions::adam(subject.data.channels().len());
         let quiet = {
             let mut it = default.clone();
             it.iterations = 0;

@@ -20,7 +20,7 @@ pub struct Setting {
 
 /// What is tried: the default, and departures from it in one way each.
 pub fn settings(channels: usize) -> Vec<Setting> {
-    let default = ErrorRegressionOptions::new(channels);
+    let default = ErrorRegressionOptions::adam(channels);
     let of = |name: &str, change: &dyn Fn(&mut ErrorRegressionOptions)| {
         let mut options = default.clone();
         change(&mut options);

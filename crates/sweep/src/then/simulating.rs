@@ -74,7 +74,7 @@ fn reach(trained: &Trained, options: &Simulate, folder: &Path, engine: &Engine) 
 fn interact(trained: &Trained, options: &Simulate, folder: &Path, engine: &Engine) -> Result<Numbers> {
     let checkpoint = &trained.checkpoint;
     let network = trained.network();
-    let mut regression = ErrorRegressionOptions::new(checkpoint.channels.len());
+    let mut regression = ErrorRegressionOptions::adam(checkpoint.channels.len());
     (regression.window, regression.iterations) = (options.window, options.iterations);
     let regression = with_own_arm(regression);
     let (mut all, mut branches): (Vec<_>, Vec<Branch>) = (Vec::new(), Vec::new());
