@@ -57,9 +57,12 @@ pub struct Step {
     /// Whether the window is as likely as what was learned, but for one nat per step and channel.
     #[pyo3(get)]
     locked: Option<bool>,
-    /// Updates that were made.
+    /// Updates that were tried.
     #[pyo3(get)]
     iterations: usize,
+    /// Whether the network predicted the window better without regression, and goes on so.
+    #[pyo3(get)]
+    given_up: bool,
     /// How long it took.
     #[pyo3(get)]
     milliseconds: f64,
@@ -83,7 +86,7 @@ pub struct Follower {
 impl Follower {
     #[new]
     #[pyo3(signature = (model, *, window=50, iterations=10, ahead=10, optimiser=None, rate=None, momentum=None, max_norm=None,
-        deadline=None, closed_channels=vec![], masked_channels=vec![], begin=None, sequence=None, contexts=false, instruction_set=None))]
+        keep_best=false, tolerance=None, guard=None, deadline=None, closed_channels=vec![], masked_channels=vec![], begin=None, sequence=None, contexts=false, instruction_set=None))]
     #[expect(clippy::too_many_arguments, reason = "they come by name, from one place in the Python layer")]
     fn new(
         py: Python<'_>,
@@ -95,6 +98,9 @@ impl Follower {
         rate: Option<f64>,
         momentum: Option<f64>,
         max_norm: Option<f64>,
+        keep_best: bool,
+        tolerance: Option<f64>,
+        guard: Option<bool>,
         deadline: Option<f64>,
         closed_channels: Vec<String>,
         masked_channels: Vec<String>,
@@ -108,21 +114,29 @@ impl Follower {
             let channels = only.checkpoint.channels.clone();
             let mut options = ErrorRegressionOptions::new(channels.len());
             (options.window, options.iterations, options.ahead) = (window, iterations, ahead);
-            match (optimiser, momentum) {
-                (Some("adam"), Some(_)) => {
-                    return Err(Failure::input(
-                        "momentum does not go with optimiser=\"adam\"",
-                        "leave one of them out",
-                    ));
-                }
-                (Some("momentum"), _) | (None, Some(_)) => {
+            (options.keep_best, options.tolerance, options.guard) = (keep_best, tolerance, guard);
+            let has_rate = rate.is_some() || max_norm.is_some();
+            let optimiser = optimiser.unwrap_or(match momentum {
+                Some(_) => "momentum",
+                None if has_rate => "adam",
+                None => "lbfgs",
+            });
+            let refuse = |what: &str| {
+                Err(Failure::input(format!("{what} does not go with optimiser={optimiser:?}"), "leave one of them out"))
+            };
+            match optimiser {
+                "adam" | "lbfgs" if momentum.is_some() => return refuse("momentum"),
+                "lbfgs" if rate.is_some() => return refuse("rate"),
+                "lbfgs" if max_norm.is_some() => return refuse("max_norm"),
+                "momentum" => {
                     let momentum = momentum.unwrap_or(0.9);
                     options.ascent = Ascent::Momentum { rate: THESIS_RATE / channels.len() as f64, momentum };
                 }
-                (Some("adam"), None) | (None, None) => {}
-                (Some(other), _) => {
+                "adam" => options.ascent = ErrorRegressionOptions::adam(0).ascent,
+                "lbfgs" => {}
+                other => {
                     let message = format!("there is no optimiser {other:?}");
-                    return Err(Failure::input(message, "give \"adam\" or \"momentum\""));
+                    return Err(Failure::input(message, "give \"lbfgs\", \"adam\" or \"momentum\""));
                 }
             }
             if let Some(rate) = rate {
@@ -196,6 +210,7 @@ impl Follower {
             error: pair(told.error),
             locked: told.locked,
             iterations: told.iterations,
+            given_up: told.given_up,
             milliseconds: told.milliseconds,
             missing,
         })

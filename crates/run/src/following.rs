@@ -37,8 +37,10 @@ pub enum Begin {
 pub struct Observed {
     /// Its number, from 1.
     pub sample: usize,
-    /// Updates of the internal state.
+    /// Updates of the internal state that were tried.
     pub iterations: usize,
+    /// Whether the network predicted the window better without regression, and goes on so.
+    pub given_up: bool,
     /// Nats per observed value of the window before and after, in scaled units; none without variance units.
     pub ln_likelihood: Option<[f64; 2]>,
     /// (3.5) over the window before and after, in scaled units.
@@ -171,7 +173,9 @@ impl Following {
     ) -> Result<Self> {
         let (topology, channels) = (&trained.checkpoint.topology, trained.checkpoint.channels.len());
         let wide = 2 * topology.context_units() + 4 * channels;
-        let bytes = product(&[options.window.saturating_add(options.ahead), wide, size_of::<f64>()]);
+        // Under a guard the network without regression runs beside.
+        let networks = 1 + usize::from(options.is_guarded() && options.iterations > 0);
+        let bytes = product(&[options.window.saturating_add(options.ahead), wide, networks, size_of::<f64>()]);
         memory::check("a window of that length", bytes)?;
         let learned = &trained.checkpoint.initial_states;
         let start = match &begin {
@@ -232,11 +236,12 @@ impl Following {
     pub fn told(&self, done: &Regression, view: bool) -> Observed {
         let values = done.values as f64;
         let has_variance = self.trained.checkpoint.topology.has_variance();
-        let regressed = done.iterations > 0 && done.values > 0;
+        let regressed = (done.iterations > 0 || done.converged || done.given_up) && done.values > 0;
         let ln_likelihood = (regressed && has_variance).then(|| done.ln_likelihood.map(|sum| sum / values));
         Observed {
             sample: self.taken,
             iterations: done.iterations,
+            given_up: done.given_up,
             ln_likelihood,
             locked: ln_likelihood.zip(self.bound).map(|([_, after], bound)| after >= bound),
             error: regressed.then(|| done.squared_error.map(|sum| sum / (2.0 * values))),

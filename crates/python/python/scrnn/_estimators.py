@@ -696,6 +696,9 @@ class Network:
         rate: float | None = None,
         momentum: float | None = None,
         max_norm: float | None = None,
+        keep_best: bool = False,
+        tolerance: float | None = None,
+        guard: bool | None = None,
         deadline: float | None = None,
         closed_channels: Sequence[str] | str = (),
         masked_channels: Sequence[str] | str = (),
@@ -709,10 +712,16 @@ class Network:
             window: Steps in the sliding window, 1 to 1000000.
             iterations: Updates of the internal state for each sample.
             ahead: Samples to predict beyond the next one.
-            optimiser: ``"adam"`` (default) or ``"momentum"``, the thesis'.
-            rate: Of the ascent.
+            optimiser: ``"lbfgs"`` (default), ``"adam"`` (default with ``rate`` or ``max_norm``) or ``"momentum"``, the thesis' (default with
+                ``momentum``).
+            rate: Of the ascent; not for ``"lbfgs"``.
             momentum: Of ``"momentum"``; by default 0.9.
-            max_norm: Longest gradient.
+            max_norm: Longest gradient; not for ``"lbfgs"``.
+            keep_best: Keep the best state that was met, be it the one before the first update; ``"lbfgs"`` does so anyway.
+            tolerance: End with an update that changes ln L of the window by less than so many nats a step. By default 2e-5 for ``"lbfgs"``, 0
+                for the others.
+            guard: Go on from the state without regression where its predictions made the window more likely than regression does. By
+                default for ``"lbfgs"`` alone.
             deadline: Milliseconds that a sample may take: updates that do not fit are left out.
             closed_channels: Channels whose input is the network's own prediction, as those of an arm that it moves.
             masked_channels: Channels whose errors do not count.
@@ -741,6 +750,9 @@ class Network:
                 rate=rate,
                 momentum=momentum,
                 max_norm=max_norm,
+                keep_best=bool(keep_best),
+                tolerance=tolerance,
+                guard=guard,
                 deadline=deadline,
                 closed_channels=names_in(closed_channels),
                 masked_channels=names_in(masked_channels),

@@ -146,7 +146,10 @@ class Step:
         """Whether the window is as likely as what was learned, but for one nat per step and channel."""
     @property
     def iterations(self) -> int:
-        """Updates that were made."""
+        """Updates that were tried."""
+    @property
+    def given_up(self) -> bool:
+        """Whether the network predicted the window better without regression, and goes on so."""
     @property
     def milliseconds(self) -> float:
         """How long it took."""
@@ -167,6 +170,9 @@ class Follower:
         rate: float | None = ...,
         momentum: float | None = ...,
         max_norm: float | None = ...,
+        keep_best: bool = ...,
+        tolerance: float | None = ...,
+        guard: bool | None = ...,
         deadline: float | None = ...,
         closed_channels: Sequence[str] = ...,
         masked_channels: Sequence[str] = ...,

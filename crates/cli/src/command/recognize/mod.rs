@@ -42,7 +42,8 @@ const NAMED: usize = 3;
 /// units (empty before the network's delay is over), `forecast` (the means of the --ahead samples after it), `ln_likelihood`
 /// (nats per step and regarded channel of the window, before and after the regression; null where there was none), `locked` (whether the
 /// window is as likely as what was learned, but for one nat per step and channel: else the forecast is not to be relied on),
-/// `milliseconds`, and `missing` (names, if any). With --full it holds `iterations`, `error` and `view` (`from`, `smoothed`,
+/// `milliseconds`, and `missing` (names, if any). With --full it holds `iterations`, `given_up` (whether the network predicted the window
+/// better without regression, and goes on so), `error` and `view` (`from`, `smoothed`,
 /// `contexts`, `predicted`, `variance`) instead.
 #[derive(Debug, Args)]
 #[command(after_help = "\

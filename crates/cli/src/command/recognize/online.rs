@@ -61,7 +61,7 @@ impl Online {
 
     fn options(&self, how: &How<'_>, trained: &Trained) -> Result<ErrorRegressionOptions> {
         let channels = &trained.checkpoint.channels;
-        let mut options = how.regression.options(how.rate, channels.len())?;
+        let mut options = how.regression.options(ErrorRegressionOptions::new(channels.len()), how.rate)?;
         options.ahead = self.ahead;
         for (names, shares) in
             [(&self.closed_channels, &mut options.sensed), (&self.masked_channels, &mut options.mask)]

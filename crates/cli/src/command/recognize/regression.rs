@@ -18,7 +18,7 @@ pub struct RegressionArguments {
     /// Updates of the internal state for each sample, 0 to 1000000 [default: 10]
     #[arg(long, value_name = "N", value_parser = crate::args::count(0, 1_000_000))]
     steps: Option<usize>,
-    /// How the internal state is moved [default: what is safe for most networks]
+    /// How the internal state is moved [default: lbfgs; adam to simulate, and with --rate or --max-norm; momentum with --momentum]
     #[arg(long, value_enum)]
     optimiser: Option<Optimiser>,
     /// Momentum of the ascent, 0 to 0.9999 [default: 0.9]
@@ -27,6 +27,16 @@ pub struct RegressionArguments {
     /// Longest gradient, 0 to 1e12; 0 leaves it as it is
     #[arg(long, value_name = "NORM", value_parser = crate::args::number(0.0, 1e12))]
     max_norm: Option<f64>,
+    /// Keep the best state that was met, be it the one before the first update; lbfgs does so anyway
+    #[arg(long)]
+    keep_best: bool,
+    /// End with an update that changes ln L of the window by less than NATS a step, 0 to 1e6 [default: 2e-5 for lbfgs, 0 for the others]
+    #[arg(long, value_name = "NATS", value_parser = crate::args::number(0.0, 1e6))]
+    tolerance: Option<f64>,
+    /// Go on from the state without regression where its predictions made the window more likely than regression does
+    /// [default: on for lbfgs, off for the others]
+    #[arg(long, value_enum)]
+    guard: Option<Guard>,
     /// Milliseconds that each sample may take, more than 0, at most 1e9: updates that do not fit are left out
     #[arg(long, value_name = "MS", value_parser = crate::args::positive(1e9))]
     deadline: Option<f64>,
@@ -39,6 +49,17 @@ enum Optimiser {
     Momentum,
     /// Adam
     Adam,
+    /// L-BFGS: no update leads downhill, and the last samples' curvature is known
+    Lbfgs,
+}
+
+/// Whether the network without regression runs beside.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Guard {
+    /// Compare with it
+    On,
+    /// Regress whatever comes of it
+    Off,
 }
 
 /// The momentum ascent's rate for one channel: divided by their number it is the one that the thesis' chapter 5 has.
@@ -47,26 +68,37 @@ const THESIS_RATE: f64 = 1e-4;
 impl RegressionArguments {
     /// Whether any of them was given.
     pub fn given(&self) -> bool {
-        let Self { window, steps, optimiser, momentum, max_norm, deadline } = self;
-        window.or(*steps).is_some() || optimiser.is_some() || momentum.or(*max_norm).or(*deadline).is_some()
+        let Self { window, steps, optimiser, momentum, max_norm, keep_best, tolerance, guard, deadline } = self;
+        let numbers = momentum.or(*max_norm).or(*tolerance).or(*deadline);
+        window.or(*steps).is_some() || optimiser.is_some() || guard.is_some() || *keep_best || numbers.is_some()
     }
 
-    /// For a network on so many channels.
-    pub fn options(&self, rate: Option<f64>, channels: usize) -> Result<ErrorRegressionOptions> {
-        let mut options = ErrorRegressionOptions::new(channels);
+    /// Changes of `default`, which says the number of channels.
+    pub fn options(&self, default: ErrorRegressionOptions, rate: Option<f64>) -> Result<ErrorRegressionOptions> {
+        let mut options = default;
         options.window = self.window.unwrap_or(options.window);
         options.iterations = self.steps.unwrap_or(options.iterations);
-        match (self.optimiser, self.momentum) {
-            (Some(Optimiser::Adam), Some(_)) => {
-                return Err(Failure::input("--momentum does not go with --optimiser adam", "leave one of them out"));
+        let has_rate = rate.is_some() || self.max_norm.is_some();
+        let optimiser = match self.optimiser {
+            None if self.momentum.is_some() => Some(Optimiser::Momentum),
+            None if has_rate && matches!(options.ascent, Ascent::Lbfgs { .. }) => Some(Optimiser::Adam),
+            given => given,
+        };
+        let refuse = |option: &str, name: &str| {
+            Err(Failure::input(format!("{option} does not go with --optimiser {name}"), "leave one of them out"))
+        };
+        match optimiser {
+            Some(Optimiser::Adam) if self.momentum.is_some() => return refuse("--momentum", "adam"),
+            Some(Optimiser::Lbfgs) if self.momentum.is_some() => return refuse("--momentum", "lbfgs"),
+            Some(Optimiser::Lbfgs) if rate.is_some() => return refuse("--rate", "lbfgs"),
+            Some(Optimiser::Lbfgs) if self.max_norm.is_some() => return refuse("--max-norm", "lbfgs"),
+            Some(Optimiser::Momentum) => {
+                let (momentum, channels) = (self.momentum.unwrap_or(0.9), options.mask.len());
+                options.ascent = Ascent::Momentum { rate: THESIS_RATE / channels as f64, momentum };
             }
-            (Some(Optimiser::Momentum), _) | (None, Some(_)) => {
-                let momentum = self.momentum.unwrap_or(0.9);
-                (options.ascent, options.max_norm) =
-                    (Ascent::Momentum { rate: THESIS_RATE / channels as f64, momentum }, None);
-            }
-            (Some(Optimiser::Adam), None) => (options.ascent, options.max_norm) = (Ascent::Adam { rate: 0.05 }, None),
-            (None, None) => {}
+            Some(Optimiser::Adam) => options.ascent = ErrorRegressionOptions::adam(0).ascent,
+            Some(Optimiser::Lbfgs) => options.ascent = ErrorRegressionOptions::new(0).ascent,
+            None => {}
         }
         if let Some(given) = rate {
             options.ascent = options.ascent.with_rate(given);
@@ -74,6 +106,9 @@ impl RegressionArguments {
         if let Some(norm) = self.max_norm {
             options.max_norm = Some(norm).filter(|&norm| norm != 0.0);
         }
+        options.keep_best = self.keep_best;
+        options.tolerance = self.tolerance;
+        options.guard = self.guard.map(|guard| guard == Guard::On);
         Ok(options)
     }
 

@@ -162,7 +162,8 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
 
 impl Arguments {
     fn options(&self, trained: &Trained) -> Result<ErrorRegressionOptions> {
-        let mut options = with_own_arm(self.regression.options(self.rate, trained.checkpoint.channels.len())?);
+        let default = ErrorRegressionOptions::adam(trained.checkpoint.channels.len());
+        let mut options = with_own_arm(self.regression.options(default, self.rate)?);
         options.ahead = 0;
         if !self.ers {
             options.iterations = 0;
