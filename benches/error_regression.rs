@@ -97,13 +97,13 @@ fn rules(subject: &Subject, window: usize) -> Vec<(&'static str, ErrorRegression
         })
     };
     let momentum = Ascent::Momentum { rate: 1e-4 / channels as f64, momentum: 0.9 };
-    let own = ErrorRegressionOptions::with(channels, |it| it.window = window);
+    let own = |iterations| rule(ErrorRegressionOptions::new(channels).ascent, iterations);
     vec![
         ("Adam 0.05", rule(Ascent::Adam { rate: 0.05 }, 10)),
         ("Adam 0.01", rule(Ascent::Adam { rate: 0.01 }, 100)),
         ("momentum, the thesis' rate", rule(momentum, 100)),
-        ("L-BFGS, guarded (default)", own.clone()),
-        ("L-BFGS, 15 steps", ErrorRegressionOptions { iterations: 15, ..own }),
+        ("L-BFGS, guarded (default)", own(10)),
+        ("L-BFGS, 15 steps", own(15)),
     ]
 }
 
