@@ -1,7 +1,7 @@
 //! Epochs in float32 beside the same epochs in float64.
 //!
 //! ```text
-//! cargo bench -p scrnn-checks --bench precision [-- [--json] [--rounds 9] [--instruction-set avx2]]
+//! cargo bench -p scrnn --bench precision [-- [--rounds 9] [--instruction-set avx2]]
 //! ```
 //!
 //! The two take turns, on one thread and on two; what is printed are medians over the rounds, and the median of the
@@ -15,7 +15,6 @@ use std::time::Duration;
 use arguments::Arguments;
 use scrnn::objective::Precision;
 use scrnn::topology::Topology;
-use serde_json::json;
 use training::{Training, waves};
 
 /// Units, sequences and steps.
@@ -32,14 +31,10 @@ fn median(mut values: Vec<f64>) -> f64 {
 fn main() {
     let arguments = Arguments::read(9);
     let shapes = if arguments.measures() { &SHAPES[..] } else { &SHAPES[..1] };
-    let mut found = Vec::new();
-    let table = !arguments.has("--json");
-    if table {
-        println!(
-            "instruction set {}\n\nunits  sequences  steps  threads   float64 ms   float32 ms    faster",
-            arguments.set
-        );
-    }
+    println!(
+        "instruction set {}\n\nunits  sequences  steps  threads   float64 ms   float32 ms    faster",
+        arguments.set
+    );
     for &(units, sequences, steps) in shapes {
         let topology = Topology::s_ctrnn(2, units, 2.0).expect("sizes above 0");
         let data = waves(&topology, sequences, steps);
@@ -58,16 +53,7 @@ fn main() {
             }
             let ratio = median(seconds[0].iter().zip(&seconds[1]).map(|(double, single)| double / single).collect());
             let [double, single] = seconds.map(|list| 1e3 * median(list));
-            if table {
-                println!("{units:5} {sequences:10} {steps:6} {threads:8} {double:12.3} {single:12.3} {ratio:8.2}x");
-            }
-            found.push(json!({
-                "units": units, "sequences": sequences, "steps": steps, "threads": threads,
-                "float64_ms": double, "float32_ms": single, "ratio": ratio,
-            }));
+            println!("{units:5} {sequences:10} {steps:6} {threads:8} {double:12.3} {single:12.3} {ratio:8.2}x");
         }
-    }
-    if !table {
-        println!("{:#}", json!({ "instruction_set": arguments.set.to_string(), "epochs": found }));
     }
 }
