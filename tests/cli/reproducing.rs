@@ -142,16 +142,19 @@ fn workers(place: &Place, line: &str) -> usize {
     let mut seen = std::collections::HashMap::new();
     while child.try_wait().unwrap().is_none() {
         for task in std::fs::read_dir(&tasks).into_iter().flatten().flatten() {
-            // A thread gets its name once it runs: the first look may be too early.
+            // A thread gets its name once it runs, which on a busy machine is late: the last look counts.
             let name = std::fs::read_to_string(task.path().join("comm")).unwrap_or_default();
-            if !["signals", "stderr", "progress", ""].contains(&name.trim_end()) {
-                *seen.entry(task.file_name()).or_insert(0) += 1;
+            if !name.is_empty() {
+                let (looks, last) = seen.entry(task.file_name()).or_insert((0, String::new()));
+                *looks += 1;
+                *last = name.trim_end().to_owned();
             }
         }
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
     assert!(child.wait().unwrap().success(), "{line}");
-    seen.values().filter(|looks| **looks > 1).count()
+    let works = |name: &str| !["signals", "stderr", "progress"].contains(&name);
+    seen.values().filter(|(looks, name)| *looks > 1 && works(name)).count()
 }
 
 #[cfg(target_os = "linux")]
