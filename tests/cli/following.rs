@@ -20,7 +20,12 @@ fn a_recorded_sequence_is_followed_sample_by_sample() {
     let sequence = &found["sequences"][0];
     let steps = sequence["steps"].as_array().unwrap();
     assert_eq!((steps.len(), sequence["samples"].as_u64()), (60, Some(60)));
-    assert_eq!((steps[0]["iterations"].as_u64(), steps[1]["iterations"].as_u64()), (Some(0), Some(5)));
+    // L-BFGS ends where there is less to gain than its tolerance; Adam makes all steps.
+    let iterations = |step: &Value| step["iterations"].as_u64().unwrap();
+    assert_eq!(iterations(&steps[0]), 0);
+    assert!(steps[1..].iter().all(|step| (1..=5).contains(&iterations(step))), "{steps:?}");
+    let by_adam = place.json(&format!("{line} --optimiser adam"));
+    assert!(by_adam["sequences"][0]["steps"].as_array().unwrap()[1..].iter().all(|step| iterations(step) == 5));
     let gained =
         steps[1..].iter().map(|step| numbers(&step["ln_likelihood"])).filter(|pair| pair[1] >= pair[0]).count();
     assert!(gained > 40, "{gained} of 59");
@@ -100,7 +105,7 @@ fn missing_and_absurd_values_of_a_stream_disable_nothing() {
     place.ok("train sine.toml --out run -q");
     let follow = |input: &str, options: &str| {
         let mut command = Command::cargo_bin("scrnn").unwrap();
-        let line = format!("recognize run - --online --window 8 --steps 5 --json {options}");
+        let line = format!("recognize run - --online --window 8 --steps 5 --optimiser adam --json {options}");
         let output = command.current_dir(&place.0).args(line.split_whitespace()).write_stdin(input).output().unwrap();
         let lines: Vec<Value> =
             String::from_utf8_lossy(&output.stdout).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
@@ -168,7 +173,8 @@ fn a_stream_whose_reader_has_left_ends() {
 #[test]
 fn a_deadline_is_kept_when_the_steps_do_not_fit() {
     let place = trained();
-    let found = place.json("recognize run new.csv --online --window 20 --steps 1000000 --deadline 20 --json");
+    let found =
+        place.json("recognize run new.csv --online --optimiser adam --window 20 --steps 1000000 --deadline 20 --json");
     let sequence = &found["sequences"][0];
     let iterations = |step: &Value| step["iterations"].as_u64().unwrap();
     let steps = &sequence["steps"].as_array().unwrap()[1..];

@@ -1,9 +1,7 @@
-//! A page that shows a robot or a stream while it goes on: its options, and the pace of what is shown.
-
-use std::time::{Duration, Instant};
+//! The options of a page that shows a robot or a stream while it goes on.
 
 use clap::Args;
-use scrnn_pages::live::{Frame, Heading, Look, Motion};
+use scrnn_pages::live::{Heading, Paced};
 use scrnn_run::failure::Result;
 
 use crate::args::number;
@@ -28,50 +26,12 @@ impl Watch {
 
     /// Begins to show, if that is wanted. `seconds` is how long one of the heading's units lasts in the world; none for what has a pace of
     /// its own.
-    pub fn start(&self, heading: &Heading<'_>, seconds: Option<f64>) -> Result<Option<Watching>> {
+    pub fn start(&self, heading: &Heading<'_>, seconds: Option<f64>) -> Result<Option<Paced>> {
         let Some(port) = self.watch else { return Ok(None) };
         let speed = Some(self.speed.unwrap_or(1.0)).filter(|speed| *speed > 0.0);
         let pace = seconds.zip(speed).map(|(seconds, speed)| speed / seconds);
-        let motion = Motion::start(port, &Heading { pace, ..*heading })?;
-        output::say(format_args!("watch it at {}", motion.url()));
-        Ok(Some(Watching { motion, pace, begun: None }))
-    }
-}
-
-/// A page, and the pace at which it is shown something.
-#[derive(Debug)]
-pub struct Watching {
-    motion: Motion,
-    /// Units of time in a second.
-    pace: Option<f64>,
-    begun: Option<(Instant, f64)>,
-}
-
-impl Watching {
-    /// Waits until it is time for what is shown next, and shows it.
-    pub fn frame(&mut self, frame: &Frame<'_>) {
-        if let Some(pace) = self.pace {
-            let (at, first) = *self.begun.get_or_insert_with(|| (Instant::now(), frame.time));
-            let due = Duration::try_from_secs_f64((frame.time - first) / pace).unwrap_or_default();
-            if let Some(early) = due.checked_sub(at.elapsed()) {
-                std::thread::sleep(early);
-            }
-        }
-        self.motion.frame(frame);
-    }
-
-    /// As [`Motion::wants_look`].
-    pub fn wants_look(&self) -> bool {
-        self.motion.wants_look()
-    }
-
-    /// As [`Motion::look`].
-    pub fn look(&mut self, look: Look, note: String) {
-        self.motion.look(look, note);
-    }
-
-    /// Nothing more will come.
-    pub fn finish(self) {
-        self.motion.finish();
+        let page = Paced::start(port, &Heading { pace, ..*heading })?;
+        output::say(format_args!("watch it at {}", page.url()));
+        Ok(Some(page))
     }
 }

@@ -24,10 +24,14 @@ use serde_json::{Value, json};
 
 mod many;
 mod motion;
+mod paced;
+mod sample_by_sample;
 mod server;
 
 pub use many::{Ends, LookAtAll, Many, OneOfMany, Stands};
 pub use motion::{Frame, Heading, Look, Motion, Sample};
+pub use paced::Paced;
+pub use sample_by_sample::SampleBySample;
 pub use server::{Answer, Server};
 
 /// Points of a learning curve; beyond, every second one goes.

@@ -325,9 +325,14 @@ struct Tile<
     out: &'a mut [E],
 }
 
+/// H vectors.
+type Vectors<S, E, const H: usize> = [<E as Element>::Vector<S>; H];
+/// H vectors by N columns.
+type Block<S, E, const H: usize, const N: usize> = [Vectors<S, E, N>; H];
+
 /// The sums of C panels of H vectors, by N columns in K chains: in registers, once all loops are unrolled.
 struct Sums<S: Simd, E: Element, const H: usize, const C: usize, const N: usize, const K: usize>(
-    [[[[E::Vector<S>; N]; H]; C]; K],
+    [[Block<S, E, H, N>; C]; K],
 );
 
 impl<S: Simd, E: Element, const H: usize, const C: usize, const N: usize, const K: usize> Sums<S, E, H, C, N, K> {
@@ -385,8 +390,8 @@ impl<S: Simd, E: Element, const H: usize, const C: usize, const N: usize, const 
 
 /// C panels of H vectors for each k: two k at a time, then the last k of an odd number.
 struct Weights<'a, S: Simd, E: Element, const H: usize, const C: usize> {
-    pairs: [&'a [[[E::Vector<S>; H]; 2]]; C],
-    last: [&'a [[E::Vector<S>; H]]; C],
+    pairs: [&'a [[Vectors<S, E, H>; 2]]; C],
+    last: [&'a [Vectors<S, E, H>]; C],
 }
 
 impl<'a, S: Simd, E: Element, const H: usize, const C: usize> Weights<'a, S, E, H, C> {
@@ -403,12 +408,12 @@ impl<'a, S: Simd, E: Element, const H: usize, const C: usize> Weights<'a, S, E, 
     }
 
     #[inline(always)]
-    fn at(&self, k: usize, half: usize) -> [&'a [E::Vector<S>; H]; C] {
+    fn at(&self, k: usize, half: usize) -> [&'a Vectors<S, E, H>; C] {
         std::array::from_fn(|c| &self.pairs[c][k][half])
     }
 
     #[inline(always)]
-    fn last(&self) -> [&'a [E::Vector<S>; H]; C] {
+    fn last(&self) -> [&'a Vectors<S, E, H>; C] {
         std::array::from_fn(|c| &self.last[c][0])
     }
 }

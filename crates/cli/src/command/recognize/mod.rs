@@ -3,7 +3,6 @@
 
 mod online;
 mod regression;
-mod showing;
 
 pub use regression::RegressionArguments;
 

@@ -11,12 +11,11 @@ use scrnn::error_regression::{ErrorRegressionOptions, Regression};
 use serde_json::json;
 
 use super::regression::RegressionArguments;
-use super::showing::Shown;
 use crate::args::{Part, Shared};
 use crate::output::{self, Reader};
 use crate::watching::Watch;
 use scrnn_data::{self as files, Field};
-use scrnn_pages::live::Heading;
+use scrnn_pages::live::{Heading, SampleBySample};
 use scrnn_report::Table;
 use scrnn_run::failure::{Ending, Failure, Result};
 use scrnn_run::familiar::{self, Range, Unfamiliar, is_far};
@@ -94,11 +93,11 @@ impl Online {
     }
 
     /// Begins to show what happens, if that is wanted. `period` is that of the samples; a stream comes at its own pace.
-    fn showing(&self, trained: &Trained, what: &str, period: Option<f64>) -> Result<Shown> {
+    fn showing(&self, trained: &Trained, what: &str, period: Option<f64>) -> Result<SampleBySample> {
         let (title, channels) = (format!("Following {what}"), &trained.checkpoint.channels);
         let scaling = &trained.checkpoint.scaling;
         let heading = Heading { title: &title, channels, scaling, unit: "samples", pace: None };
-        Ok(Shown::on(self.watch.start(&heading, period)?))
+        Ok(SampleBySample::on(self.watch.start(&heading, period)?))
     }
 
     /// Begins to follow.

@@ -17,9 +17,9 @@ use crate::args::Shared;
 use crate::command::view;
 use crate::output;
 use crate::outputs::check_distinct;
-use crate::watching::{Watch, Watching};
+use crate::watching::Watch;
 use scrnn_data as files;
-use scrnn_pages::live::{Frame, Heading, Sample};
+use scrnn_pages::live::{Frame, Heading, Paced, Sample};
 use scrnn_report::Table;
 use scrnn_run::failure::{Ending, Failure, Result};
 use scrnn_run::trained::Trained;
@@ -201,7 +201,7 @@ pub fn run(arguments: &Arguments, shared: &Shared) -> Result<Ending> {
 /// A performance on a page, as it goes on.
 #[derive(Debug)]
 struct Shown {
-    watching: Watching,
+    watching: Paced,
     /// What was decided on the last sample, and so what the next one was predicted as.
     expected: Decision,
     /// Pictures that were taken.

@@ -12,7 +12,7 @@ use pulp::Simd;
 /// 1.5 * 2^23: added and taken off again, it rounds to the nearest integer, which the lowest bits hold.
 const ROUND: f32 = 12_582_912.0;
 /// ln 2 / 2, and what its rounding leaves over.
-const HALF_LN2: (f32, f32) = (0.346_573_59, -9.523_271e-10);
+const HALF_LN2: (f32, f32) = (0.346_573_6, -9.523_271e-10);
 /// (tanh h / h - 1) / h^2 in h^2, on |h| <= ln 2 / 4; error below 2e-10 of tanh h / h.
 const TANH: [f32; 3] = [-0.333_333_22, 0.133_311_6, -0.052_721_415];
 /// From here on tanh is 1 in float32.

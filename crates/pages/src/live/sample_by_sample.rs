@@ -1,15 +1,14 @@
-//! What `recognize --online --watch` shows: the window, the forecast and the error.
+//! A network beside a stream: the window, the forecast and the error.
 
 use scrnn::error_regression::Regression;
-use scrnn_pages::live::{Frame, Look, Sample};
 use scrnn_run::following::{Following, View};
 
-use crate::watching::Watching;
+use super::{Frame, Look, Paced, Sample};
 
 /// A page about a stream, if somebody wants one.
 #[derive(Debug, Default)]
-pub struct Shown {
-    watching: Option<Watching>,
+pub struct SampleBySample {
+    watching: Option<Paced>,
     /// What the next sample was predicted as.
     mean: Vec<f64>,
     variance: Vec<f64>,
@@ -20,9 +19,10 @@ pub struct Shown {
     event: Option<String>,
 }
 
-impl Shown {
-    /// On this page.
-    pub fn on(watching: Option<Watching>) -> Self {
+impl SampleBySample {
+    /// On this page, or nowhere.
+    #[must_use]
+    pub fn on(watching: Option<Paced>) -> Self {
         Self { watching, ..Self::default() }
     }
 
