@@ -481,7 +481,8 @@ mod tests {
         assert!(begun.elapsed() < Duration::from_secs(1) && motion.waiting.len() == WAITING);
         drop(held);
         motion.frame(&Frame { time: 1000.0, ..Frame::default() });
-        assert_eq!((locked(&state).frames.len(), locked(&state).frames.back().unwrap().time), (WAITING, 1000.0));
+        let held = locked(&state);
+        assert_eq!((held.frames.len(), held.frames.back().unwrap().time), (WAITING, 1000.0));
     }
 
     #[test]
