@@ -54,6 +54,8 @@ CHANGES = [
 ]
 #: A line of progress, which comes every few seconds; only that of the last epoch is compared.
 PROGRESS = re.compile(r"(?:\S+ )?epoch (\d+)/(\d+)  ")
+#: What is said while something else takes its time; a slow machine says more of it.
+BUSY = re.compile(r".*, (?:\d+ min )?\d+ s|.*: epoch \d+/\d+")
 DIRECTIVE = re.compile(r"<!-- check: (.*?) -->")
 
 
@@ -63,7 +65,7 @@ def wrapped(output):
     for line in output.splitlines():
         line = line.split("\r")[-1].rstrip()
         progress = PROGRESS.match(line)
-        if progress and progress[1] != progress[2]:
+        if (progress and progress[1] != progress[2]) or BUSY.fullmatch(line):
             continue
         is_prose = len(line) > WIDTH and line.count(" ") > 8 and not re.search(r"\S {2,}\S", line)
         parts = textwrap.wrap(line, WIDTH, break_long_words=False, break_on_hyphens=False) if is_prose else [line]
