@@ -50,6 +50,7 @@ pub const OPTIONS: &[(&str, &str, &str)] = &[
     ("simulate interact", "momentum", "simulate interact interact --ers --steps 1 --window 5"),
     ("simulate interact", "max-norm", "simulate interact interact --ers --steps 1 --window 5"),
     ("simulate interact", "tolerance", "simulate interact interact --ers --steps 1 --window 5"),
+    ("simulate interact", "speed", "simulate interact interact --watch"),
     ("simulate interact", "deadline", "simulate interact interact --ers --steps 1 --window 5"),
     ("sweep", "stale", "sweep sweep.toml --dry-run"),
     ("sweep", "array-size", "sweep sweep.toml --slurm --dry-run"),
