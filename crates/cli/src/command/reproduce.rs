@@ -87,7 +87,8 @@ fn experiments() -> impl TypedValueParser<Value = &'static Experiment> {
 /// Reproduces.
 pub fn run(arguments: &Arguments, (shared, signals): (&Shared, &Signals)) -> Result<Ending> {
     let interrupt = signals.listen();
-    let work = Work::begin(arguments.experiment.word, shared.quiet);
+    // Data come first, whatever was trained already.
+    let work = Work::begin(&format!("{}: making the data", arguments.experiment.word), shared.quiet);
     let context = Context {
         threads: shared.engine()?.threads(),
         instruction_set: shared.instruction_set(),
