@@ -14,6 +14,7 @@ const scrnnScene = (canvas, bodies, placeOf, keys) => {
   const unit = (a) => a.map((value) => value / (Math.hypot(...a) || 1));
 
   // The camera circles a target; up is z.
+  const aspectOf = () => canvas.clientWidth / canvas.clientHeight || 1;
   const camera = { turn: 0.5, tilt: 0.35, distance: 2, target: [0, 0, 0], angle: 0.7 };
   const eyeOf = () => {
     const { turn, tilt, distance, target } = camera;
@@ -23,8 +24,9 @@ const scrnnScene = (canvas, bodies, placeOf, keys) => {
   const seen = () => {
     const eye = eyeOf(), back = unit(minus(eye, camera.target)), right = unit(cross([0, 0, 1], back)), up = cross(back, right);
     const view = new Float64Array([right[0], up[0], back[0], 0, right[1], up[1], back[1], 0, right[2], up[2], back[2], 0, -dot(right, eye), -dot(up, eye), -dot(back, eye), 1]);
-    const near = camera.distance / 100, far = camera.distance * 100, wide = 1 / Math.tan(camera.angle / 2);
-    const aspect = canvas.clientWidth / canvas.clientHeight || 1;
+    const near = camera.distance / 100, far = camera.distance * 100, aspect = aspectOf();
+    // The angle is that of the shorter side, so that what fits on a screen fits on a phone.
+    const wide = Math.min(1, aspect) / Math.tan(camera.angle / 2);
     const lens = new Float64Array([wide / aspect, 0, 0, 0, 0, wide, 0, 0, 0, 0, (far + near) / (near - far), -1, 0, 0, (2 * far * near) / (near - far), 0]);
     return { all: times4(lens, view), right, up, eye };
   };
@@ -158,7 +160,7 @@ const scrnnScene = (canvas, bodies, placeOf, keys) => {
   canvas.addEventListener("pointerdown", (event) => { canvas.setPointerCapture(event.pointerId); fingers.set(event.pointerId, event); });
   for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, (event) => fingers.delete(event.pointerId));
   const move = (x, y) => {
-    const { right, up } = seen(), step = (2 * camera.distance * Math.tan(camera.angle / 2)) / canvas.clientHeight;
+    const { right, up } = seen(), step = (2 * camera.distance * Math.tan(camera.angle / 2)) / (canvas.clientHeight * Math.min(1, aspectOf()));
     camera.target = camera.target.map((value, k) => value + step * (y * up[k] - x * right[k]));
   };
   canvas.addEventListener("pointermove", (event) => {
