@@ -106,7 +106,9 @@ fn a_reproduction_tells_what_it_is_at_and_ctrl_c_ends_it_there() {
     let place = Place::new();
     let line = "reproduce interact --epochs 5 --threads 1 --out pair";
     let watched = Watched::start(&place, line);
-    watched.until("recordings of two robots, ");
+    watched.until("recordings of two robots");
+    // Which one it is at, or how long it has been at it.
+    watched.until("recording");
     let (took, code, said) = watched.interrupt();
     assert!(took < ENDED && code == Some(130), "{took:?}, {code:?}: {said}");
     assert!(said.contains("the same command goes on"), "{said}");
