@@ -80,7 +80,7 @@ impl Subject<'_> {
 
     /// The order of the figures with error regression from a state that does not correspond, as a recording.
     pub fn film(&self, key: &str, label: &str) -> Result<Film> {
-        let options = with_own_arm(ErrorRegressionOptions::new(self.data.channels().len()));
+        let options = with_own_arm(ErrorRegressionOptions::adam(self.data.channels().len()));
         let state = self.states.sequence(self.other());
         let mut interaction = Interaction::new(&parse_order(SHOWN)?, &InteractionOptions::default(), self.seed, 0)?;
         let mut film = Recording::new(&[("task", "interact")])?;
