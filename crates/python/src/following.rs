@@ -6,18 +6,15 @@ use std::time::Duration;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use scrnn::error_regression::{Ascent, ErrorRegressionOptions};
+use scrnn::error_regression::ErrorRegressionOptions;
 use scrnn_run::failure::Failure;
-use scrnn_run::following::{Begin, Deadline, Following};
+use scrnn_run::following::{Begin, Conflict, Deadline, Following, Rule, Wanted};
 use scrnn_run::trained::Trained;
 
 use crate::arrays::matrix;
 use crate::failure::compute;
 use crate::machine::engine;
 use crate::model::Model;
-
-/// The momentum ascent's rate for one channel, that of the thesis' chapter 5.
-const THESIS_RATE: f64 = 1e-4;
 
 /// What became of one sample, in the data's units.
 ///
@@ -115,34 +112,15 @@ impl Follower {
             let mut options = ErrorRegressionOptions::new(channels.len());
             (options.window, options.iterations, options.ahead) = (window, iterations, ahead);
             (options.keep_best, options.tolerance, options.guard) = (keep_best, tolerance, guard);
-            let has_rate = rate.is_some() || max_norm.is_some();
-            let optimiser = optimiser.unwrap_or(match momentum {
-                Some(_) => "momentum",
-                None if has_rate => "adam",
-                None => "lbfgs",
-            });
-            let refuse = |what: &str| {
-                Err(Failure::input(format!("{what} does not go with optimiser={optimiser:?}"), "leave one of them out"))
+            let named = |name: &str| {
+                let help = "give \"lbfgs\", \"adam\" or \"momentum\"";
+                Rule::named(name).ok_or_else(|| Failure::input(format!("there is no optimiser {name:?}"), help))
             };
-            match optimiser {
-                "adam" | "lbfgs" if momentum.is_some() => return refuse("momentum"),
-                "lbfgs" if rate.is_some() => return refuse("rate"),
-                "lbfgs" if max_norm.is_some() => return refuse("max_norm"),
-                "momentum" => {
-                    let momentum = momentum.unwrap_or(0.9);
-                    options.ascent = Ascent::Momentum { rate: THESIS_RATE / channels.len() as f64, momentum };
-                }
-                "adam" => options.ascent = ErrorRegressionOptions::adam(0).ascent,
-                "lbfgs" => {}
-                other => {
-                    let message = format!("there is no optimiser {other:?}");
-                    return Err(Failure::input(message, "give \"lbfgs\", \"adam\" or \"momentum\""));
-                }
-            }
-            if let Some(rate) = rate {
-                options.ascent = options.ascent.with_rate(rate);
-            }
-            options.max_norm = max_norm.filter(|norm| *norm != 0.0);
+            let wanted = Wanted { rule: optimiser.map(named).transpose()?, rate, momentum, max_norm };
+            wanted.change(&mut options).map_err(|Conflict { what, rule }| {
+                let message = format!("{what} does not go with optimiser={:?}", rule.name());
+                Failure::input(message, "leave one of them out")
+            })?;
             for (names, shares) in [(&closed_channels, &mut options.sensed), (&masked_channels, &mut options.mask)] {
                 for name in names {
                     let place = channels.iter().position(|channel| channel == name).ok_or_else(|| {

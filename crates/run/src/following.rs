@@ -1,8 +1,10 @@
 //! Follows samples while they arrive, by error regression (thesis 2.10.2), in the data's units.
 
+mod ascending;
 mod deadline;
 mod locking;
 
+pub use ascending::{Conflict, Rule, Wanted};
 pub use deadline::{Deadline, Latency};
 pub use locking::bound;
 

@@ -87,7 +87,7 @@ fn shard(text: &str) -> std::result::Result<(usize, usize), String> {
 /// Works on a sweep, or shows it.
 pub fn run(arguments: &Arguments, (shared, signals): (&Shared, &Signals)) -> Result<Ending> {
     if arguments.status && arguments.sweep.join(PLAN).is_file() {
-        return show_status(&arguments.sweep, arguments, signals);
+        return show_status(&arguments.sweep, None, arguments, signals);
     }
     if arguments.sweep.is_dir() {
         let message = format!("{} is a folder, not a sweep file", arguments.sweep.display());
@@ -99,7 +99,7 @@ pub fn run(arguments: &Arguments, (shared, signals): (&Shared, &Signals)) -> Res
     let plan = Plan::read(&arguments.sweep)?;
     let folder = arguments.out.clone().unwrap_or_else(|| Path::new("runs").join(&plan.file.name));
     if arguments.status {
-        return show_status(&folder, arguments, signals);
+        return show_status(&folder, Some(&plan), arguments, signals);
     }
     if arguments.slurm {
         return queue(arguments, (shared, &plan), &folder);
@@ -122,7 +122,7 @@ pub fn run(arguments: &Arguments, (shared, signals): (&Shared, &Signals)) -> Res
         retry: arguments.retry,
         wait: !arguments.no_wait,
     };
-    let _page = page(arguments, &folder)?;
+    let _page = page(arguments.watch, &folder, Some(&plan))?;
     let worked = working::work(&plan, &folder, &options, &context)?;
     if arguments.json {
         output::print_json(&worked)?;
@@ -144,12 +144,12 @@ fn ending(worked: &Worked, arguments: &Arguments, shared: &Shared) -> Ending {
     worked.ending()
 }
 
-/// Serves a page about the runs in the folder of a sweep, if that is wanted.
-fn page(arguments: &Arguments, folder: &Path) -> Result<Option<Many>> {
-    let Some(port) = arguments.watch else { return Ok(None) };
+/// Serves a page about the runs in the folder of a sweep, if that is wanted. Runs that were not begun have as many epochs as the plan's
+/// first, if there is a plan at hand.
+fn page(watch: Option<u16>, folder: &Path, plan: Option<&Plan>) -> Result<Option<Many>> {
+    let Some(port) = watch else { return Ok(None) };
     let name = folder.file_name().unwrap_or(folder.as_os_str()).to_string_lossy().into_owned();
-    let epochs = Plan::read(&arguments.sweep).ok().and_then(|plan| Some((plan.runs.first()?.clone(), plan)));
-    let epochs = epochs.and_then(|(run, plan)| Some(plan.experiment(&run).ok()?.training.epochs)).unwrap_or(0);
+    let epochs = plan.and_then(|plan| Some(plan.experiment(plan.runs.first()?).ok()?.training.epochs)).unwrap_or(0);
     let folder = folder.to_owned();
     let look = move || {
         let one = |Named { run, state, message }: Named| OneOfMany {
@@ -171,9 +171,9 @@ fn page(arguments: &Arguments, folder: &Path) -> Result<Option<Many>> {
     Ok(Some(page))
 }
 
-fn show_status(folder: &Path, arguments: &Arguments, signals: &Signals) -> Result<Ending> {
+fn show_status(folder: &Path, plan: Option<&Plan>, arguments: &Arguments, signals: &Signals) -> Result<Ending> {
     let status = Status::read(folder)?;
-    if let Some(_page) = page(arguments, folder)? {
+    if let Some(_page) = page(arguments.watch, folder, plan)? {
         let interrupt = signals.listen();
         while !interrupt.asked() {
             std::thread::sleep(std::time::Duration::from_millis(100));

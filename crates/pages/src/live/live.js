@@ -1,17 +1,8 @@
 (() => {
   "use strict";
   const root = document.getElementById("live"), find = (name) => root.querySelector("." + name);
-  const SVG = "http://www.w3.org/2000/svg";
-  const make = (parent, name, attributes, text) => {
-    const node = document.createElementNS(SVG, name);
-    for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
-    if (text !== undefined) node.textContent = text;
-    parent.append(node);
-  };
-  const words = (seconds) => {
-    const s = Math.round(seconds);
-    return s < 60 ? `${s} s` : s < 3600 ? `${Math.floor(s / 60)} min ${s % 60} s` : s < 864e5 ? `${Math.floor(s / 3600)} h ${Math.floor((s % 3600) / 60)} min` : "more than 1000 days";
-  };
+  const make = scrnnMake;
+  const words = scrnnWords;
   const range = (lists) => {
     let low = Infinity, high = -Infinity;
     for (const list of lists) for (const value of list) if (value !== null) { low = Math.min(low, value); high = Math.max(high, value); }
@@ -45,15 +36,11 @@
     const all = find("loops");
     all.replaceChildren();
     data.sequences.forEach((sequence) => sequence.channels.forEach((channel, i) => {
-      const svg = document.createElementNS(SVG, "svg"), length = channel.recorded.length;
+      const svg = make(all, "svg", { viewBox: "0 0 300 120", role: "img", "aria-label": `${sequence.name}, ${data.channels[i]}` }), length = channel.recorded.length;
       const [low, high] = range([channel.recorded, channel.own]), y = (value) => (value === null ? null : 112 - (88 * (value - low)) / (high - low));
-      svg.setAttribute("viewBox", "0 0 300 120");
-      svg.setAttribute("role", "img");
-      svg.setAttribute("aria-label", `${sequence.name}, ${data.channels[i]}`);
       make(svg, "text", { x: 6, y: 15 }, `${sequence.name}, ${data.channels[i]}`);
       make(svg, "polyline", { class: "ours", points: line(channel.own.map((value, k) => [4 + (292 * (k + data.delay)) / length, y(value)])) });
       make(svg, "polyline", { class: "truth", points: line(channel.recorded.map((value, k) => [4 + (292 * k) / length, y(value)])) });
-      all.append(svg);
     }));
   };
   const state = { polls: 0, failed: 0, over: false };
@@ -69,19 +56,6 @@
     learning(data);
     loops(data.loop);
   };
-  const poll = async () => {
-    try {
-      const answer = await fetch("data.json", { cache: "no-store" });
-      if (!answer.ok) throw new Error(answer.status);
-      draw(await answer.json());
-      state.failed = 0;
-      state.polls++;
-    } catch (error) {
-      state.failed++;
-      if (!state.over) find("stand").textContent = "The training does not answer: it has ended, or is busy. Asking again.";
-    }
-    setTimeout(poll, Math.min(10_000, 1_000 * (1 + state.failed)));
-  };
-  poll();
+  scrnnPoll(state, () => "data.json", draw, () => { if (!state.over) find("stand").textContent = "The training does not answer: it has ended, or is busy. Asking again."; }, () => Math.min(10_000, 1_000 * (1 + state.failed)));
   window.scrnnLive = state;
 })();

@@ -3,18 +3,8 @@
   // Rows of the table; thousands would say no more.
   const ROWS = 200;
   const root = document.getElementById("many"), find = (name) => root.querySelector("." + name);
-  const SVG = "http://www.w3.org/2000/svg";
-  const make = (parent, name, attributes, text) => {
-    const node = document.createElementNS(SVG, name);
-    for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
-    if (text !== undefined) node.textContent = text;
-    parent.append(node);
-    return node;
-  };
-  const words = (seconds) => {
-    const s = Math.round(seconds);
-    return s < 60 ? `${s} s` : s < 3600 ? `${Math.floor(s / 60)} min ${s % 60} s` : s < 864e5 ? `${Math.floor(s / 3600)} h ${Math.floor((s % 3600) / 60)} min` : "more than 1000 days";
-  };
+  const make = scrnnMake;
+  const words = scrnnWords;
   const state = { run: null, version: 0, polls: 0, failed: 0, over: false, runs: [] };
   const classes = { finished: "finished", "being trained": "working", failed: "failed" };
   const known = (value) => value !== null && value !== undefined;
@@ -89,19 +79,6 @@
     find("stand").textContent = data.problem ? `The folder cannot be read: ${data.problem}` : data.runs ? `Of ${data.runs} runs: ${counts}.${left}` : "Waiting for the first run.";
     if (data.changed.length) { curves(data); table(data); }
   };
-  const poll = async () => {
-    try {
-      const answer = await fetch(`data/${state.version}.json`, { cache: "no-store" });
-      if (!answer.ok) throw new Error(answer.status);
-      take(await answer.json());
-      state.failed = 0;
-      state.polls++;
-    } catch (error) {
-      state.failed++;
-      if (!state.over) find("stand").textContent = "There is no answer: it has ended, or is busy. Asking again.";
-    }
-    setTimeout(poll, Math.min(10_000, 1_000 * (1 + state.failed)));
-  };
-  poll();
+  scrnnPoll(state, () => `data/${state.version}.json`, take, () => { if (!state.over) find("stand").textContent = "There is no answer: it has ended, or is busy. Asking again."; }, () => Math.min(10_000, 1_000 * (1 + state.failed)));
   window.scrnnMany = state;
 })();

@@ -17,7 +17,7 @@ use scrnn_run::messages::Progress;
 use scrnn_run::run_folder::{EXPERIMENT, HISTORY};
 use serde_json::{Value, json};
 
-use super::{Server, served};
+use super::{Server, served, this_run};
 
 /// Points of a curve, where there are few runs and where there are many.
 const POINTS: (usize, usize) = (150, 40);
@@ -195,9 +195,8 @@ struct Seen {
 
 impl Seen {
     fn new(epochs: u64) -> Self {
-        let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         Self {
-            run: format!("{}-{}", std::process::id(), since.as_nanos()),
+            run: this_run(),
             epochs,
             looked: None,
             version: 0,
@@ -347,7 +346,7 @@ fn page(title: &str) -> Page {
             .into(),
         body: BODY.into(),
         style: include_str!("many.css"),
-        script: include_str!("many.js"),
+        script: concat!(include_str!("../common.js"), include_str!("many.js")),
         data: "{}".into(),
     };
     let blocks = vec![Block::Applet(Box::new(applet))];

@@ -97,6 +97,12 @@ fn locked(state: &Mutex<State>) -> MutexGuard<'_, State> {
     state.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Another for each page of each run of the program: who finds another begins anew.
+fn this_run() -> String {
+    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    format!("{}-{}", std::process::id(), since.as_nanos())
+}
+
 /// Serves on the loopback address.
 fn served(port: u16, answer: Box<Answer>) -> Result<Server> {
     Server::start(port, answer).map_err(|error| {
@@ -321,7 +327,7 @@ fn page(name: &str) -> Page {
             .into(),
         body: BODY.into(),
         style: include_str!("live.css"),
-        script: include_str!("live.js"),
+        script: concat!(include_str!("../common.js"), include_str!("live.js")),
         data: "{}".into(),
     };
     let blocks = vec![Block::Applet(Box::new(applet))];

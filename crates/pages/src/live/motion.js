@@ -23,14 +23,7 @@
   const scene = scrnnScene(canvas, () => state.bodies, (body) => placed(index.get(body), state.shown), {});
   const home = () => scene.home(state.bodies.filter((body) => !body.stands).map((body) => placed(index.get(body), state.shown)).filter(Boolean));
 
-  const SVG = "http://www.w3.org/2000/svg";
-  const make = (parent, name, attributes, text) => {
-    const node = document.createElementNS(SVG, name);
-    for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
-    if (text !== undefined) node.textContent = text;
-    parent.append(node);
-    return node;
-  };
+  const make = scrnnMake;
   const known = (value) => value !== null && value !== undefined;
   const round = (value) => Number(value.toPrecision(3));
   const line = (svg, kind, points) => { if (points.length) make(svg, "polyline", { class: kind, points: points.map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`).join(" ") }); };
@@ -137,18 +130,6 @@
     }
     requestAnimationFrame(draw);
   };
-  const poll = async () => {
-    try {
-      const answer = await fetch(`data/${state.next}.json`, { cache: "no-store" });
-      if (!answer.ok) throw new Error(answer.status);
-      take(await answer.json());
-      state.failed = 0;
-      state.polls++;
-    } catch (error) {
-      state.failed++;
-    }
-    setTimeout(poll, state.failed ? Math.min(5_000, 500 * state.failed) : state.finished ? 2_000 : 100);
-  };
   play.addEventListener("click", () => {
     state.held = !state.held;
     play.textContent = state.held ? "go on" : "hold";
@@ -156,7 +137,7 @@
     words();
   });
   find("home").addEventListener("click", () => { home(); scene.paint(); });
-  poll();
+  scrnnPoll(state, () => `data/${state.next}.json`, take, () => {}, () => (state.failed ? Math.min(5_000, 500 * state.failed) : state.finished ? 2_000 : 100));
   requestAnimationFrame(draw);
   // For tests, and for whoever wants the numbers.
   const { camera, project, measure } = scene;

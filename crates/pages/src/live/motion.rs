@@ -6,7 +6,7 @@
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 use scrnn::scaling::Scaling;
 use scrnn_report::{Applet, Block, Page, Section};
@@ -14,7 +14,7 @@ use scrnn_run::failure::Result;
 use scrnn_sim::world::scene::{Form, Part, Primitive, Scene};
 use serde_json::{Value, json};
 
-use super::{Server, served};
+use super::{Server, served, this_run};
 use crate::view::base64;
 
 /// Frames that are kept for readers.
@@ -154,9 +154,8 @@ impl Motion {
     /// [`Failure::Input`](scrnn_run::failure::Failure::Input) for a port that is taken.
     pub fn start(port: u16, heading: &Heading<'_>) -> Result<Self> {
         let state = Arc::new(Mutex::new(State::default()));
-        let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         let about = About {
-            run: format!("{}-{}", std::process::id(), since.as_nanos()),
+            run: this_run(),
             channels: heading.channels.iter().take(CHANNELS).cloned().collect(),
             unit: heading.unit,
             pace: heading.pace,
@@ -389,7 +388,7 @@ impl Body {
 }
 
 const BODY: &str = r#"<p class="verdict stand" role="status" aria-live="polite">Waiting for the first sample.</p>
-<canvas class="world" hidden tabindex="0" role="img" aria-label="The robots in 3-D. Drag to turn, wheel to come nearer; or arrow keys, plus and minus"></canvas>
+<canvas class="world" hidden tabindex="0" role="img" title="Drag to turn, wheel to come nearer" aria-label="The robots in 3-D. Drag to turn, wheel to come nearer; or arrow keys, plus and minus"></canvas>
 <p class="missing" role="status" hidden></p>
 <div class="controls">
 <button class="play" type="button" aria-pressed="false">hold</button>
@@ -409,11 +408,11 @@ fn page(heading: &Heading<'_>) -> Page {
         caption: format!(
             "What was sensed is dashed; the line is what the network expected of it one step before, the band two of its standard deviations. \
              To the right of the upright line is what it expects to come; what it now makes of the past is drawn in green where it revises that. \
-             The error is the root of the mean square over all channels, in the network's units. Drag the picture to turn it.{left_out}"
+             The error is the root of the mean square over all channels, in the network's units.{left_out}"
         ),
         body: BODY.into(),
         style: include_str!("motion.css"),
-        script: concat!(include_str!("../view/scene.js"), include_str!("motion.js")),
+        script: concat!(include_str!("../common.js"), include_str!("../view/scene.js"), include_str!("motion.js")),
         data: "{}".into(),
     };
     let blocks = vec![Block::Applet(Box::new(applet))];

@@ -19,7 +19,7 @@ const STATES: usize = 200;
 
 /// One step of a network in script: `scrnnStep(NETWORK)` with a network of [`OneStep::json`] gives `begin` and `step`.
 pub const STEP: &str = include_str!("step.js");
-const SCRIPT: &str = concat!(include_str!("step.js"), include_str!("play.js"));
+const SCRIPT: &str = concat!(include_str!("../common.js"), include_str!("step.js"), include_str!("play.js"));
 
 /// What is in the page before the script draws.
 const BODY: &str = r#"<div class="controls">

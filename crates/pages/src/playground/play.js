@@ -4,15 +4,8 @@
   const data = JSON.parse(document.getElementById("playground-data").textContent);
   const net = scrnnStep(data.network), n = net.channels, delay = data.network.kind.delay;
   const find = (name) => root.querySelector("." + name);
-  const SVG = "http://www.w3.org/2000/svg";
   const levels = ["var(--level-0)", "var(--level-1)", "var(--level-2)", "var(--level-3)"];
-  const make = (parent, name, attributes, text) => {
-    const node = document.createElementNS(SVG, name);
-    for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
-    if (text !== undefined) node.textContent = text;
-    parent.append(node);
-    return node;
-  };
+  const make = scrnnMake;
   const state = { at: [...data.plane.points[0]], nearest: 0, noise: false, seed: 1, push: 0, when: 20, channel: 0, steps: data.steps };
 
   // Random numbers of a normal distribution, the same for the same seed.

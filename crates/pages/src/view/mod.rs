@@ -266,7 +266,7 @@ impl Story {
                 .into(),
             body: BODY.into(),
             style: include_str!("view.css"),
-            script: concat!(include_str!("scene.js"), include_str!("view.js")),
+            script: concat!(include_str!("../common.js"), include_str!("scene.js"), include_str!("view.js")),
             data: data.to_string(),
         };
         let mut sections = vec![Section { title: "Recording".into(), blocks: vec![Block::Applet(Box::new(applet))] }];

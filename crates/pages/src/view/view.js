@@ -35,14 +35,7 @@
     scene.home(places);
   };
 
-  const SVG = "http://www.w3.org/2000/svg";
-  const make = (parent, name, attributes, text) => {
-    const node = document.createElementNS(SVG, name);
-    for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
-    if (text !== undefined) node.textContent = text;
-    parent.append(node);
-    return node;
-  };
+  const make = scrnnMake;
   const length = data.length || 1, across = (time) => (1000 * time) / length;
   const marks = find("marks");
   for (const { pair, times } of data.contacts) for (const time of times) make(make(marks, "line", { class: "contact", x1: across(time), x2: across(time), y1: 5, y2: 10 }), "title", {}, `${pair} touch at ${time.toFixed(1)} s`);

@@ -6,8 +6,9 @@
 //!
 //! The matrix is cut into panels as tall as a tile of the instruction set; within a panel the values of one k lie side
 //! by side, so a product reads it front to back. A tile of a panel and a few columns keeps all of its sums in registers.
-//! One column leaves too few sums in flight to hide their latency: then a tile spans several panels, a band. Sums run over k in ascending order; few rows are summed in two interleaved chains, because a short sum would otherwise wait
-//! for its own latency. Neither depends on the number of columns.
+//! One column leaves too few sums in flight to hide their latency: then a tile spans several panels, a band. Sums run over
+//! k in ascending order; few rows are summed in two interleaved chains, because a short sum would otherwise wait for its
+//! own latency. Neither depends on the number of columns.
 
 #![allow(clippy::needless_range_loop, reason = "loops over the constant sides of a tile unroll; indices say which")]
 
@@ -29,12 +30,10 @@ pub struct Panels<E = f64> {
     rows: usize,
     inner: usize,
     chains: usize,
-    /// First row and height of each panel.
-    panels: Vec<(usize, usize)>,
-    /// The panels that a tile of one column spans.
-    bands: Vec<Band>,
     /// A band for each panel.
     single: Vec<Band>,
+    /// The panels that a tile of one column spans.
+    bands: Vec<Band>,
     values: AVec<E>,
 }
 
@@ -106,13 +105,13 @@ impl<E: Element> Panels<E> {
         };
         let values = AVec::from_iter(64, std::iter::repeat_n(E::ZERO, rows * inner));
         let panels = panels(rows, tallest, E::ROWS);
-        let [bands, single] = [span(set, chains), 1].map(|span| bands(&panels, span));
-        Self { rows, inner, chains, panels, bands, single, values }
+        let [single, bands] = [1, span(set, chains)].map(|span| bands(&panels, span));
+        Self { rows, inner, chains, single, bands, values }
     }
 
     /// Writes `value(row, k)` everywhere; rows beyond `rows` stay 0.
     pub fn fill(&mut self, rows: usize, value: impl Fn(usize, usize) -> f64) {
-        for &(start, height) in &self.panels {
+        for &Band { row: start, height, .. } in &self.single {
             let panel = &mut self.values[start * self.inner..(start + height) * self.inner];
             for (k, out) in panel.chunks_exact_mut(height).enumerate() {
                 for (r, out) in out.iter_mut().enumerate().take(rows.saturating_sub(start)) {
@@ -349,7 +348,7 @@ impl<S: Simd, E: Element, const H: usize, const C: usize, const N: usize, const 
 
     /// Adds the products of one value of column `n` with the weights of its k.
     #[inline(always)]
-    fn add(&mut self, simd: S, chain: usize, n: usize, weights: [&[E::Vector<S>; H]; C], x: E::Vector<S>) {
+    fn add(&mut self, simd: S, chain: usize, n: usize, weights: [&Vectors<S, E, H>; C], x: E::Vector<S>) {
         for c in 0..C {
             for h in 0..H {
                 let sum = &mut self.0[chain][c][h][n];

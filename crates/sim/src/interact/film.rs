@@ -2,8 +2,6 @@
 
 use std::io::Cursor;
 
-use scrnn::analysis::excursions::Side;
-
 use super::interaction::{CHANNELS, Interaction};
 use super::order::PERIOD;
 use crate::recording::{Contact, Heading, Joint, Recorder, RecordingError, Robot};
@@ -88,9 +86,8 @@ impl Film {
             let depth = interaction.depth();
             recorder.event(time, &format!("collision with {collision:?}").to_lowercase(), &[("depth", depth)])?;
         }
-        if let Some((branch, side)) = interaction.branching() {
-            let side = if side == Side::Left { "left" } else { "right" };
-            recorder.event(time, &format!("branching {branch} to the {side}"), &[])?;
+        if let Some(branching) = interaction.branching() {
+            recorder.event(time, &branching, &[])?;
         }
         let in_view = interaction.object_in_view();
         if in_view != self.in_view {

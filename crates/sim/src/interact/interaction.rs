@@ -328,12 +328,13 @@ impl Interaction {
         self.world.contacts().into_iter().map(named).collect()
     }
 
-    /// The number of the branching that begins now, from 1, and the side to which the object goes.
+    /// The branching that begins now, in words: its number, from 1, and the side to which the object goes.
     #[must_use]
-    pub fn branching(&self) -> Option<(usize, Side)> {
+    pub fn branching(&self) -> Option<String> {
         let sample = (self.time() / PERIOD).round() as usize;
         let branch = branchings(self.order.len()).iter().position(|at| *at == sample)?;
-        Some((branch + 1, self.order[branch]))
+        let side = if self.order[branch] == Side::Left { "left" } else { "right" };
+        Some(format!("branching {} to the {side}", branch + 1))
     }
 
     /// How deep it ran into it, in metres.

@@ -3,10 +3,10 @@
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
-use scrnn::error_regression::{Ascent, ErrorRegressionOptions};
+use scrnn::error_regression::ErrorRegressionOptions;
 
 use scrnn_run::failure::{Failure, Result};
-use scrnn_run::following::Deadline;
+use scrnn_run::following::{Conflict, Deadline, Rule, Wanted};
 
 /// Options of error regression.
 #[derive(Debug, Args)]
@@ -62,9 +62,6 @@ enum Guard {
     Off,
 }
 
-/// The momentum ascent's rate for one channel: divided by their number it is the one that the thesis' chapter 5 has.
-const THESIS_RATE: f64 = 1e-4;
-
 impl RegressionArguments {
     /// Whether any of them was given.
     pub fn given(&self) -> bool {
@@ -78,34 +75,16 @@ impl RegressionArguments {
         let mut options = default;
         options.window = self.window.unwrap_or(options.window);
         options.iterations = self.steps.unwrap_or(options.iterations);
-        let has_rate = rate.is_some() || self.max_norm.is_some();
-        let optimiser = match self.optimiser {
-            None if self.momentum.is_some() => Some(Optimiser::Momentum),
-            None if has_rate && matches!(options.ascent, Ascent::Lbfgs { .. }) => Some(Optimiser::Adam),
-            given => given,
-        };
-        let refuse = |option: &str, name: &str| {
-            Err(Failure::input(format!("{option} does not go with --optimiser {name}"), "leave one of them out"))
-        };
-        match optimiser {
-            Some(Optimiser::Adam) if self.momentum.is_some() => return refuse("--momentum", "adam"),
-            Some(Optimiser::Lbfgs) if self.momentum.is_some() => return refuse("--momentum", "lbfgs"),
-            Some(Optimiser::Lbfgs) if rate.is_some() => return refuse("--rate", "lbfgs"),
-            Some(Optimiser::Lbfgs) if self.max_norm.is_some() => return refuse("--max-norm", "lbfgs"),
-            Some(Optimiser::Momentum) => {
-                let (momentum, channels) = (self.momentum.unwrap_or(0.9), options.mask.len());
-                options.ascent = Ascent::Momentum { rate: THESIS_RATE / channels as f64, momentum };
-            }
-            Some(Optimiser::Adam) => options.ascent = ErrorRegressionOptions::adam(0).ascent,
-            Some(Optimiser::Lbfgs) => options.ascent = ErrorRegressionOptions::new(0).ascent,
-            None => {}
-        }
-        if let Some(given) = rate {
-            options.ascent = options.ascent.with_rate(given);
-        }
-        if let Some(norm) = self.max_norm {
-            options.max_norm = Some(norm).filter(|&norm| norm != 0.0);
-        }
+        let rule = self.optimiser.map(|optimiser| match optimiser {
+            Optimiser::Momentum => Rule::Momentum,
+            Optimiser::Adam => Rule::Adam,
+            Optimiser::Lbfgs => Rule::Lbfgs,
+        });
+        let wanted = Wanted { rule, rate, momentum: self.momentum, max_norm: self.max_norm };
+        wanted.change(&mut options).map_err(|Conflict { what, rule }| {
+            let message = format!("--{} does not go with --optimiser {}", what.replace('_', "-"), rule.name());
+            Failure::input(message, "leave one of them out")
+        })?;
         options.keep_best = self.keep_best;
         options.tolerance = self.tolerance;
         options.guard = self.guard.map(|guard| guard == Guard::On);

@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use scrnn::analysis::excursions::Side;
 use scrnn::dataset::{Dataset, Sequence};
 use scrnn::error_regression::{ErrorRegression, ErrorRegressionOptions};
 use scrnn::streams::Purpose;
@@ -188,8 +187,7 @@ fn happening(interaction: &Interaction) -> Option<String> {
     if let Some(collision) = interaction.collision() {
         return Some(format!("collision with {collision:?}").to_lowercase());
     }
-    let (branch, side) = interaction.branching()?;
-    Some(format!("branching {branch} to the {}", if side == Side::Left { "left" } else { "right" }))
+    interaction.branching()
 }
 
 impl Arguments {
