@@ -301,6 +301,80 @@ fn the_library_opens_no_file_prints_nothing_and_reads_no_clock() {
     report(&problems);
 }
 
+/// The modules of a crate: path to file, e.g. `learning::adam` to `learning/adam.rs`.
+fn modules<'a>(sources: &'a [Text], folder: &str) -> BTreeMap<Vec<String>, &'a Text> {
+    let own = sources.iter().filter_map(|text| Some((text.path.strip_prefix(folder)?.strip_suffix(".rs")?, text)));
+    let own = own.filter(|(_, text)| !text.is_test());
+    let path =
+        |name: &str| -> Vec<String> { name.split('/').filter(|part| *part != "mod").map(str::to_owned).collect() };
+    own.map(|(name, text)| (path(name), text)).collect()
+}
+
+/// The paths in a tree of `use`.
+fn leaves(tree: &syn::UseTree, before: &[String], found: &mut Vec<Vec<String>>) {
+    let with = |name: &syn::Ident| [before, &[name.to_string()]].concat();
+    match tree {
+        syn::UseTree::Path(path) => leaves(&path.tree, &with(&path.ident), found),
+        syn::UseTree::Name(name) => found.push(with(&name.ident)),
+        syn::UseTree::Rename(name) => found.push(with(&name.ident)),
+        syn::UseTree::Glob(_) => found.push(before.to_vec()),
+        syn::UseTree::Group(group) => group.items.iter().for_each(|tree| leaves(tree, before, found)),
+    }
+}
+
+/// Which modules of its crate the module `own` imports. What is handed on by `pub use` is not used, and a module with those
+/// below it is one.
+fn imports(own: &[String], text: &Text, modules: &BTreeMap<Vec<String>, &Text>) -> BTreeSet<Vec<String>> {
+    let file = syn::parse_file(&text.text).unwrap_or_else(|error| panic!("{}: {error}", text.path));
+    let mut paths = Vec::new();
+    for item in &file.items {
+        if let syn::Item::Use(item) = item
+            && !matches!(item.vis, syn::Visibility::Public(_))
+        {
+            leaves(&item.tree, &[], &mut paths);
+        }
+    }
+    let above = own.split_last().map_or(own, |(_, above)| above);
+    let whole = |path: &Vec<String>| match path.first()?.as_str() {
+        "crate" => Some(path[1..].to_vec()),
+        "super" => Some([above, &path[1..]].concat()),
+        _ => None,
+    };
+    let deepest =
+        |path: Vec<String>| (1..=path.len()).rev().map(|n| path[..n].to_vec()).find(|p| modules.contains_key(p));
+    let found = paths.iter().filter_map(whole).filter_map(deepest);
+    found.filter(|other| !other.starts_with(own) && !own.starts_with(other)).collect()
+}
+
+/// Files that import each other in a ring of three or more cannot be read one after the other.
+#[test]
+fn no_more_than_two_files_import_each_other_in_a_ring() {
+    let sources = sources();
+    let crates: BTreeSet<_> =
+        sources.iter().filter_map(|text| text.path.split_once("/src/")).map(|(at, _)| at).collect();
+    let mut problems = Vec::new();
+    for folder in crates {
+        let modules = modules(&sources, &format!("{folder}/src/"));
+        let imports: BTreeMap<_, _> =
+            modules.iter().map(|(own, text)| (own.clone(), imports(own, text, &modules))).collect();
+        let reached = |from: &Vec<String>| {
+            let (mut seen, mut open) = (BTreeSet::new(), vec![from.clone()]);
+            while let Some(next) = open.pop() {
+                open.extend(imports[&next].iter().filter(|other| seen.insert((*other).clone())).cloned());
+            }
+            seen
+        };
+        let all: BTreeMap<_, _> = imports.keys().map(|own| (own.clone(), reached(own))).collect();
+        for (own, far) in &all {
+            let ring: Vec<_> = far.iter().filter(|other| all[*other].contains(own)).map(|p| p.join("::")).collect();
+            if ring.len() > 2 && ring[0] == own.join("::") {
+                problems.push(format!("{folder}: {}", ring.join(", ")));
+            }
+        }
+    }
+    report(&problems);
+}
+
 #[test]
 fn only_one_file_of_the_program_prints() {
     let words = ["println!", "print!", "io::stdout()", "io::stderr()", "dbg!"];

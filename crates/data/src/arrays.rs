@@ -19,7 +19,7 @@ use crate::natural::natural;
 use crate::reading::Topic;
 use crate::remark::Remark;
 use crate::samples::{Samples, Track, split_off};
-use crate::{ArrayProblem, Axes, FileError, Selection, npz, times};
+use crate::{ArrayProblem, Axes, FileError, Selection, times};
 
 /// Numbers with a shape. NaN is missing.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -73,9 +73,13 @@ const CLOCKS: &[&str] = &[
     "frame_times",
 ];
 
+/// What the array is called that holds the names of the sequences, in what this project writes.
+pub const SEQUENCES: &str = "names_of_sequences";
+/// What the array is called that holds the names of the channels; of a field with channels of its own: and its name.
+pub const CHANNELS: &str = "names_of_channels";
 /// Names of texts that are the names of sequences, and of channels.
-const SEQUENCE_NAMES: &[&str] = &[npz::SEQUENCES, "sequence_names", "episode_names", "demo_names"];
-const CHANNEL_NAMES: &[&str] = &[npz::CHANNELS, "channel_names", "joint_names"];
+const SEQUENCE_NAMES: &[&str] = &[SEQUENCES, "sequence_names", "episode_names", "demo_names"];
+const CHANNEL_NAMES: &[&str] = &[CHANNELS, "channel_names", "joint_names"];
 
 /// Sequences of arrays.
 ///

@@ -13,7 +13,7 @@ use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 use scrnn::dataset::Dataset;
 
 use super::npy::{Contents, Length, Refused, array_bytes, file_error, parse, text_bytes};
-use crate::arrays::{Texts, to_samples};
+use crate::arrays::{CHANNELS, SEQUENCES, Texts, to_samples};
 use crate::excerpt::shortened;
 use crate::remark::Remark;
 use crate::samples::Samples;
@@ -97,10 +97,6 @@ pub fn read(source: &Source<'_>, selection: &Selection) -> Result<Samples, FileE
     Ok(samples)
 }
 
-/// What the array is called that holds the names of the sequences.
-pub const SEQUENCES: &str = "names_of_sequences";
-/// What the array is called that holds the names of the channels; of a field with channels of its own: and its name.
-pub const CHANNELS: &str = "names_of_channels";
 /// Most bytes of an array of names: texts are as wide as the longest.
 const LONGEST_NAMES: usize = 1 << 24;
 

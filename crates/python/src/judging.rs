@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use pyo3::prelude::*;
 use scrnn::dataset::Dataset;
 use scrnn::engine::Engine;
+use scrnn_run::digest::digest;
 use scrnn_run::evaluation::{Bench, Report, Search, SimpleModels};
 use scrnn_run::failure::{Failure, Result};
 use scrnn_run::members;
-use scrnn_run::source::{self, Source};
+use scrnn_run::source::Source;
 use scrnn_run::trained::Trained;
 use scrnn_run::variance_factor::VarianceFactor;
 
@@ -156,7 +157,7 @@ pub fn calibrate<'py>(
 fn refuse_learned(model: &Model, data: &Dataset, source: Option<&Source>) -> Result<()> {
     let help = "a factor from learned sequences would promise too much: give others";
     if let Some(notes) = &model.first()?.notes
-        && notes.data.digest == source::digest(data)
+        && notes.data.digest == digest(data)
     {
         return Err(Failure::input("these are the sequences that were learned", help));
     }

@@ -116,6 +116,21 @@ fn median(values: &mut [f64]) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
+/// Channels whose predicted samples are all the same.
+pub fn still_channels(data: &Dataset, delay: usize) -> Vec<String> {
+    let n = data.channels().len();
+    let predicted = || data.sequences().iter().filter_map(|sequence| sequence.values().get(delay * n..));
+    let still = |i: usize| {
+        let samples = predicted().flat_map(|values| values.chunks_exact(n)).map(|sample| sample[i]);
+        let mut samples = samples.filter(|value| !value.is_nan());
+        let first = samples.next();
+        samples.all(|sample| Some(sample) == first)
+    };
+    // One sample says nothing about change.
+    let several = predicted().map(|values| values.len() / n).sum::<usize>() > 1;
+    (0..n).filter(|&i| several && still(i)).map(|i| data.channels()[i].clone()).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -15,11 +15,12 @@ use serde::Serialize;
 
 use crate::assessment::Predictions;
 use crate::channels;
+use crate::digest::digest;
 use crate::evaluation::{self, Bench, ClosedLoop, Distance, Member, OneStep, Search, SimpleModels};
 use crate::experiment::{Experiment, HeldOut, HeldOutDrawn, HeldOutFiles};
 use crate::failure::{Failure, Result};
 use crate::notes::{HeldOutNotes, HeldOutScore};
-use crate::source::{self, Source};
+use crate::source::Source;
 
 /// Closed loops of each sequence while the network learns: enough for a trend.
 const COPIES: usize = 10;
@@ -109,7 +110,7 @@ fn part(data: &Dataset, held: &[bool], out: bool) -> Result<Dataset> {
 pub(crate) fn notes(source: &Source) -> Option<HeldOutNotes> {
     let held_out = source.held_out.as_ref()?;
     let names = held_out.sequences().iter().map(|sequence| sequence.name.clone()).collect();
-    Some(HeldOutNotes { digest: source::digest(held_out), names })
+    Some(HeldOutNotes { digest: digest(held_out), names })
 }
 
 /// A look at the network while it learns.

@@ -5,7 +5,7 @@
 //! | [`experiment`] | the experiment file: its types, how it is read, checked, overridden and compared |
 //! | [`request`], [`recipe`] | what `train` is given: an experiment file, a run folder, or data alone, for which settings are chosen |
 //! | `trial` | how long to learn, by sequences that are left out for the choice |
-//! | [`source`] | the sequences of an experiment, made or read, and their fingerprint |
+//! | [`source`], [`digest`] | the sequences of an experiment, made or read, and their fingerprint |
 //! | [`character`] | what kind of movement data are: smooth or noisy, and whether it comes to rest |
 //! | [`training`] | one training, from a resolved experiment to a run folder: begun, gone on with, or begun anew |
 //! | [`verdict`] | the result of a training, in words and as JSON |
@@ -36,6 +36,7 @@ pub mod channels;
 pub mod character;
 pub mod completion;
 pub mod conversion;
+pub mod digest;
 pub mod evaluation;
 pub mod experiment;
 pub mod export;

@@ -4,7 +4,7 @@
 //! sequences. A mixture predicts by the mean of its members' densities, each of the same weight.
 
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use scrnn::engine::{Engine, InstructionSet};
 use scrnn::jobs::side_by_side;
@@ -20,6 +20,7 @@ use crate::messages::{Messages, Progress};
 use crate::notes::Score;
 use crate::recipe;
 use crate::run_folder::{BEST, CHECKPOINT, EXPERIMENT, HISTORY, RunFolder};
+pub use crate::run_folder::{member as folder, members as folders};
 use crate::source;
 use crate::trained::Trained;
 use crate::training::{Found, introduce, train, write_experiment};
@@ -28,22 +29,9 @@ use crate::trial;
 /// Most networks of a mixture.
 pub const MOST: u64 = 100;
 
-/// The folder of member `k`, from 1, in the run at `path`.
-pub fn folder(path: &Path, k: usize) -> PathBuf {
-    path.join(format!("member-{k}"))
-}
-
 /// What goes before what is shown of member `k`, from 1.
 pub fn label(k: usize) -> String {
     format!("member {k}: ")
-}
-
-/// The folders of all members of the run at `path`; none if it is the run of a single network.
-pub fn folders(path: &Path) -> Vec<PathBuf> {
-    if path.join(CHECKPOINT).exists() {
-        return Vec::new();
-    }
-    (1..).map(|k| folder(path, k)).take_while(|folder| folder.join(CHECKPOINT).exists()).collect()
 }
 
 /// All networks of a run folder or a checkpoint file: one, or the members of a mixture.

@@ -4,9 +4,8 @@ use scrnn::dataset::{Dataset, Sequence};
 use scrnn::learning::{Adam, ClosedLoop};
 use scrnn_data::suspicions::{Suspicion, look};
 
-use crate::character::Character;
+use crate::character::{Character, still_channels};
 use crate::experiment::{Comment, Experiment, Group, MeanUnits, Network, ScalingName, SkipName, Training};
-use crate::training::still_channels;
 
 /// What to begin with.
 #[derive(Debug, Clone, PartialEq)]

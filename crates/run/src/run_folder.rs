@@ -22,6 +22,19 @@ pub const CLAIM: &str = "claim-";
 /// All that a training keeps there.
 pub const FILES: [&str; 5] = [EXPERIMENT, CHECKPOINT, BEST, HISTORY, LOCK];
 
+/// The folder of member `k`, from 1, in the run at `path`.
+pub fn member(path: &Path, k: usize) -> PathBuf {
+    path.join(format!("member-{k}"))
+}
+
+/// The folders of all members of the run at `path`; none if it is the run of a single network.
+pub fn members(path: &Path) -> Vec<PathBuf> {
+    if path.join(CHECKPOINT).exists() {
+        return Vec::new();
+    }
+    (1..).map(|k| member(path, k)).take_while(|folder| folder.join(CHECKPOINT).exists()).collect()
+}
+
 /// A run folder that this process owns.
 #[derive(Debug)]
 pub struct RunFolder {

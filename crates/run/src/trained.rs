@@ -7,13 +7,13 @@ use scrnn::dataset::Dataset;
 use scrnn::network::Network;
 
 use crate::channels;
+use crate::digest::digest;
 use crate::experiment::Evaluation;
 use crate::failure::{Failure, Result};
 use crate::familiar;
-use crate::members;
 use crate::messages::Messages;
 use crate::notes::Notes;
-use crate::run_folder::{BEST, CHECKPOINT};
+use crate::run_folder::{self, BEST, CHECKPOINT};
 use crate::source::{self, Source};
 use scrnn_data::Selection;
 
@@ -38,12 +38,12 @@ impl Trained {
         let file = if path.is_dir() {
             let name = if best { BEST } else { CHECKPOINT };
             let file = path.join(name);
-            let members = members::folders(path).len();
+            let members = run_folder::members(path).len();
             if members > 0 {
                 let message = format!("{} holds a mixture of {members} networks", path.display());
                 return Err(Failure::input(
                     message,
-                    format!("give one of them: {}", members::folder(path, 1).display()),
+                    format!("give one of them: {}", run_folder::member(path, 1).display()),
                 ));
             }
             if !file.exists() {
@@ -164,8 +164,7 @@ impl Trained {
         })?;
         let source = source::of(&experiment, threads)?;
         let held_out = notes.data.held_out.as_ref().map(|notes| notes.digest.clone());
-        if source::digest(&source.data) != notes.data.digest || source.held_out.as_ref().map(source::digest) != held_out
-        {
+        if digest(&source.data) != notes.data.digest || source.held_out.as_ref().map(digest) != held_out {
             return Err(Failure::input("the data changed since the network learned them", other));
         }
         Ok(source)

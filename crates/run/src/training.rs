@@ -12,6 +12,8 @@ use scrnn::scaling::Scaling;
 use scrnn::topology::Topology;
 use scrnn_data::Level;
 
+use crate::character::still_channels;
+use crate::digest::digest;
 use crate::experiment::{self, Experiment, ScalingChoice, ScalingName};
 use crate::failure::{Failure, Result};
 use crate::familiar::ranges;
@@ -125,7 +127,7 @@ pub fn train_on(
     let notes = Notes {
         experiment: learned_part(experiment),
         data: DataNotes {
-            digest: source::digest(&source.data),
+            digest: digest(&source.data),
             lengths: source.data.sequences().iter().map(|sequence| sequence.len()).collect(),
             ranges: ranges(&source.data).into_iter().map(Option::unwrap_or_default).collect(),
             held_out: held_out::notes(&source),
@@ -250,21 +252,6 @@ fn chosen(experiment: &Experiment, path: &Path) -> String {
         experiment.training.epochs,
         path.join(EXPERIMENT).display()
     )
-}
-
-/// Channels whose predicted samples are all the same.
-pub fn still_channels(data: &Dataset, delay: usize) -> Vec<String> {
-    let n = data.channels().len();
-    let predicted = || data.sequences().iter().filter_map(|sequence| sequence.values().get(delay * n..));
-    let still = |i: usize| {
-        let samples = predicted().flat_map(|values| values.chunks_exact(n)).map(|sample| sample[i]);
-        let mut samples = samples.filter(|value| !value.is_nan());
-        let first = samples.next();
-        samples.all(|sample| Some(sample) == first)
-    };
-    // One sample says nothing about change.
-    let several = predicted().map(|values| values.len() / n).sum::<usize>() > 1;
-    (0..n).filter(|&i| several && still(i)).map(|i| data.channels()[i].clone()).collect()
 }
 
 /// A channel that never changes lets its variance fall for ever: refuses it where no floor stops that.

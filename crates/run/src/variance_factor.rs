@@ -15,9 +15,9 @@ use scrnn::topology::Topology;
 use serde::{Deserialize, Serialize};
 
 use crate::assessment::Predictions;
+use crate::digest::digest;
 use crate::evaluation::{Bench, Member};
 use crate::failure::{Failure, Result};
-use crate::source;
 
 /// Factors up to this and down to its inverse are told.
 const MOST: f64 = 1e6;
@@ -103,7 +103,7 @@ impl VarianceFactor {
             left_out: (each.len() > 1).then(|| (0..each.len()).map(|s| left_out(s) * terms(s)).sum::<f64>() / total),
         };
         let samples = each.iter().map(|channels| channels[0].errors.len()).sum();
-        Ok((Self { factors, sequences: each.len(), samples, digest: source::digest(raw) }, effect))
+        Ok((Self { factors, sequences: each.len(), samples, digest: digest(raw) }, effect))
     }
 }
 

@@ -10,11 +10,12 @@ use serde::Serialize;
 
 use crate::assessment;
 use crate::channel_scores::{ChannelScore, channel_scores};
+use crate::character::still_channels;
 use crate::evaluation::Member;
 use crate::failure::Result;
 use crate::held_out::Judgement;
 use crate::notes::Score;
-use crate::training::{Training, still_channels};
+use crate::training::Training;
 use crate::truth::{self, Comparison};
 
 /// The result of a training.

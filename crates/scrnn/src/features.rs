@@ -15,17 +15,8 @@
 
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
+pub use crate::skip::Skip;
 use crate::topology::Topology;
-
-/// A connection from the samples to the mean, past the context: constants, fitted once to the training data.
-#[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct Skip {
-    /// A_l, `[lag][to][from]`: what the guess takes of the last differences; empty for the last sample alone.
-    taps: Vec<f64>,
-    /// s, one for each channel.
-    scale: Vec<f64>,
-}
 
 /// What a skip connection guesses.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,25 +45,6 @@ const NO_ERROR: f64 = 1e-9;
 const RIDGE: f64 = 1e-6;
 
 impl Skip {
-    /// A connection from its constants: A_l as `[lag][to][from]`, and s of each channel.
-    ///
-    /// # Errors
-    /// [`Error::Length`] for taps that fill no whole lags, [`Error::Setting`] for a scale that is not above 0 and finite, or for taps
-    /// that are not finite.
-    pub fn new(taps: Vec<f64>, scale: Vec<f64>) -> Result<Self> {
-        let square = scale.len().pow(2).max(1);
-        if !taps.len().is_multiple_of(square) {
-            let needed = taps.len().next_multiple_of(square);
-            return Err(Error::Length { what: "the list of taps".to_owned(), found: taps.len(), needed });
-        }
-        if let Some(bad) = taps.iter().find(|tap| !tap.is_finite()) {
-            let (what, needed) = ("a tap of the skip connection", "a finite number");
-            return Err(Error::Setting { what, found: bad.to_string(), needed });
-        }
-        positive("a scale of the skip connection", &scale)?;
-        Ok(Self { taps, scale })
-    }
-
     /// Fits a connection to data in the network's units: the taps where the kind has some to fit, and s as the root mean square of
     /// what is left over. `delay` is xi.
     ///
@@ -123,18 +95,6 @@ impl Skip {
         });
         Self::new(taps, scale.collect())
     }
-
-    /// A_l, `[lag][to][from]`.
-    #[must_use]
-    pub fn taps(&self) -> &[f64] {
-        &self.taps
-    }
-
-    /// s of each channel.
-    #[must_use]
-    pub fn scale(&self) -> &[f64] {
-        &self.scale
-    }
 }
 
 /// Root mean squares of the differences between neighbouring samples, one for each channel: what velocity inputs are divided by. 1 for
@@ -150,13 +110,6 @@ pub fn velocity_deviations(data: &Dataset) -> Vec<f64> {
         (sum / count.max(1) as f64).sqrt()
     };
     (0..n).map(|i| Some(square(i)).filter(|s| *s > NO_ERROR * moments[i].1.sqrt() && *s > 0.0).unwrap_or(1.0)).collect()
-}
-
-pub(crate) fn positive(what: &'static str, values: &[f64]) -> Result<()> {
-    match values.iter().find(|value| !(**value > 0.0 && value.is_finite())) {
-        Some(bad) => Err(Error::Setting { what, found: bad.to_string(), needed: "a number above 0" }),
-        None => Ok(()),
-    }
 }
 
 #[cfg(feature = "analysis")]
@@ -241,7 +194,7 @@ impl Features {
         let n = topology.channels();
         let velocity = topology.velocity_inputs().map(|sd| sd.iter().map(|sd| 1.0 / sd).collect());
         let skip = topology.skip().cloned();
-        let lags = skip.as_ref().map_or(0, |skip| skip.taps.len() / (n * n));
+        let lags = skip.as_ref().map_or(0, |skip| skip.taps().len() / (n * n));
         Self { n, velocity: velocity.unwrap_or_default(), skip, lags, floor: topology.variance_floor() }
     }
 
@@ -272,7 +225,7 @@ impl Features {
     /// s of a channel.
     #[inline(always)]
     pub fn scale(&self, channel: usize) -> f64 {
-        self.skip.as_ref().map_or(1.0, |skip| skip.scale[channel])
+        self.skip.as_ref().map_or(1.0, |skip| skip.scale()[channel])
     }
 
     /// Writes the inputs of a step; `at(l)` is the sample l steps back.
@@ -291,7 +244,7 @@ impl Features {
     #[inline(always)]
     pub fn guess<'b>(&self, at: impl Fn(usize) -> &'b [f64], b: &mut [f64]) {
         match &self.skip {
-            Some(skip) => Guess { n: self.n, lags: self.lags, taps: &skip.taps }.write(at, b),
+            Some(skip) => Guess { n: self.n, lags: self.lags, taps: skip.taps() }.write(at, b),
             None => b.fill(0.0),
         }
     }
@@ -300,7 +253,7 @@ impl Features {
     #[inline(always)]
     pub fn mean(&self, channel: usize, guess: f64, rho: f64) -> f64 {
         match &self.skip {
-            Some(skip) => guess + skip.scale[channel] * rho,
+            Some(skip) => guess + skip.scale()[channel] * rho,
             None => rho,
         }
     }
@@ -309,7 +262,7 @@ impl Features {
     #[inline(always)]
     pub fn variance(&self, channel: usize, exp_u: f64) -> f64 {
         match &self.skip {
-            Some(skip) => skip.scale[channel].powi(2) * (exp_u + self.floor),
+            Some(skip) => skip.scale()[channel].powi(2) * (exp_u + self.floor),
             None => exp_u + self.floor,
         }
     }
@@ -319,7 +272,7 @@ impl Features {
     pub fn back(&self, lag: usize, g: &[f64], out: &mut [f64]) {
         let n = self.n;
         if let Some(skip) = &self.skip {
-            for (g, row) in g.iter().zip(skip.taps[lag * n * n..].chunks_exact(n)) {
+            for (g, row) in g.iter().zip(skip.taps()[lag * n * n..].chunks_exact(n)) {
                 for (out, tap) in out.iter_mut().zip(row) {
                     *out += tap * g;
                 }

@@ -162,5 +162,6 @@ mod backward;
 mod batch;
 mod packed;
 mod quasi_newton;
+mod skip;
 mod stepper;
 mod trajectory;

@@ -5,7 +5,7 @@
 //! a group's rules say whether the input reaches it and whether it drives the outputs (2.27).
 
 use crate::error::{Error, Result};
-use crate::features::{Skip, positive};
+use crate::skip::{Skip, positive};
 
 /// Context units that share a time constant and a place in the hierarchy.
 #[derive(Debug, Clone, PartialEq)]

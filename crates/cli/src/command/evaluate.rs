@@ -6,11 +6,12 @@ use clap::Args;
 use scrnn::dataset::Dataset;
 use scrnn::engine::Engine;
 use scrnn_data as files;
+use scrnn_run::digest::digest;
 use scrnn_run::evaluation::{Bench, Report, Search, SimpleModels};
 use scrnn_run::failure::{Ending, Failure, Result};
 use scrnn_run::members;
 use scrnn_run::run_folder::RunFolder;
-use scrnn_run::source::{self, Source};
+use scrnn_run::source::Source;
 use scrnn_run::trained::Trained;
 use scrnn_run::variance_factor::{Effect, VarianceFactor};
 use serde::Serialize;
@@ -192,7 +193,7 @@ fn bench(
 fn calibrate(trained: &Trained, (bench, data, source): (&Bench, &Dataset, Option<&Source>)) -> Result<Calibrated> {
     let help = "a factor from learned sequences would promise too much: give others";
     if let Some(notes) = &trained.notes
-        && notes.data.digest == source::digest(data)
+        && notes.data.digest == digest(data)
     {
         return Err(Failure::input("these are the sequences that were learned", help));
     }

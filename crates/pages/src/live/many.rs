@@ -17,7 +17,7 @@ use scrnn_run::messages::Progress;
 use scrnn_run::run_folder::{EXPERIMENT, HISTORY};
 use serde_json::{Value, json};
 
-use super::{Server, served, this_run};
+use super::server::{Server, served, this_run};
 
 /// Points of a curve, where there are few runs and where there are many.
 const POINTS: (usize, usize) = (150, 40);

@@ -15,7 +15,7 @@ use scrnn::generation::{Feedback, GenerationOptions};
 use scrnn::learning::EpochReport;
 use scrnn_report::{Applet, Block, Page, Section};
 use scrnn_run::assessment;
-use scrnn_run::failure::{Failure, Result};
+use scrnn_run::failure::Result;
 use scrnn_run::held_out::Glance;
 use scrnn_run::messages::Progress;
 use scrnn_run::run_folder::BEST;
@@ -32,6 +32,7 @@ pub use many::{Ends, LookAtAll, Many, OneOfMany, Stands};
 pub use motion::{Frame, Heading, Look, Motion, Sample};
 pub use paced::Paced;
 pub use sample_by_sample::SampleBySample;
+use server::served;
 pub use server::{Answer, Server};
 
 /// Points of a learning curve; beyond, every second one goes.
@@ -95,22 +96,6 @@ pub struct Live {
 fn locked(state: &Mutex<State>) -> MutexGuard<'_, State> {
     // A reader that panicked left the numbers as they are.
     state.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Another for each page of each run of the program: who finds another begins anew.
-fn this_run() -> String {
-    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-    format!("{}-{}", std::process::id(), since.as_nanos())
-}
-
-/// Serves on the loopback address.
-fn served(port: u16, answer: Box<Answer>) -> Result<Server> {
-    Server::start(port, answer).map_err(|error| {
-        Failure::input(
-            format!("nothing can be served on port {port}: {error}"),
-            "give another, or 0 for any that is free",
-        )
-    })
 }
 
 impl Live {

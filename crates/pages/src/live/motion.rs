@@ -14,7 +14,7 @@ use scrnn_run::failure::Result;
 use scrnn_sim::world::scene::{Form, Part, Primitive, Scene};
 use serde_json::{Value, json};
 
-use super::{Server, served, this_run};
+use super::server::{Server, served, this_run};
 use crate::view::base64;
 
 /// Frames that are kept for readers.

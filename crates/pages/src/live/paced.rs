@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use scrnn_run::failure::Result;
 
-use super::{Frame, Heading, Look, Motion};
+use super::motion::{Frame, Heading, Look, Motion};
 
 /// A page, and the pace at which it is shown something.
 #[derive(Debug)]

@@ -3,7 +3,8 @@
 use scrnn::error_regression::Regression;
 use scrnn_run::following::{Following, View};
 
-use super::{Frame, Look, Paced, Sample};
+use super::motion::{Frame, Look, Sample};
+use super::paced::Paced;
 
 /// A page about a stream, if somebody wants one.
 #[derive(Debug, Default)]

@@ -7,7 +7,9 @@ use std::io::{Read, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
+
+use scrnn_run::failure::Failure;
 
 /// Bytes of the longest request.
 const LONGEST: usize = 8 << 10;
@@ -67,6 +69,22 @@ impl Server {
     pub fn url(&self) -> String {
         format!("http://{}/", self.address)
     }
+}
+
+/// Another for each page of each run of the program: who finds another begins anew.
+pub(super) fn this_run() -> String {
+    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    format!("{}-{}", std::process::id(), since.as_nanos())
+}
+
+/// Serves on the loopback address.
+pub(super) fn served(port: u16, answer: Box<Answer>) -> Result<Server, Failure> {
+    Server::start(port, answer).map_err(|error| {
+        Failure::input(
+            format!("nothing can be served on port {port}: {error}"),
+            "give another, or 0 for any that is free",
+        )
+    })
 }
 
 impl Drop for Server {

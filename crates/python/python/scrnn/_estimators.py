@@ -926,7 +926,7 @@ class Network:
         """
         from scrnn import _plots
 
-        return _plots.initial_states(self, ax)
+        return _plots.initial_states(self.initial_states, self.sequences, ax)
 
     def __repr__(self) -> str:
         defaults = self._signature()

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from scrnn import _scrnn
-from scrnn._data import column_of
+from scrnn._data import Floats, column_of
 from scrnn._results import Evaluation, Generated, History
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from scrnn._estimators import Network
 
 
 def axes(ax: Axes | None) -> Axes:
@@ -89,17 +89,17 @@ def calibration(found: Evaluation, ax: Axes | None) -> Axes:
     return ax
 
 
-def initial_states(network: Network, ax: Axes | None) -> Axes:
-    """The initial states on their first two principal components."""
+def initial_states(states: Floats, names: Sequence[str], ax: Axes | None) -> Axes:
+    """The initial states of the sequences of these names, on their first two principal components."""
     ax = axes(ax)
-    states = network.initial_states - network.initial_states.mean(axis=0)
+    states = states - states.mean(axis=0)
     _, _, components = np.linalg.svd(states, full_matrices=False)
     places = np.zeros((len(states), 2))
     count = min(2, len(components))
     places[:, :count] = states @ components[:count].T
     ax.scatter(places[:, 0], places[:, 1])
     if len(states) <= 40:
-        for name, (x, y) in zip(network.sequences, places):
+        for name, (x, y) in zip(names, places):
             ax.annotate(name, (x, y), textcoords="offset points", xytext=(4, 4), fontsize=8)
     ax.set_xlabel("first principal component")
     ax.set_ylabel("second")
