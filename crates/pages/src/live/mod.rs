@@ -102,7 +102,7 @@ impl Live {
     /// Serves a page about the training of `name` in a run folder. Of `data` it draws a few sequences beside the best network.
     ///
     /// # Errors
-    /// [`scrnn::Failure::Input`] for a port that is taken.
+    /// A port that is taken.
     pub fn start(port: u16, (name, epochs): (&str, u64), folder: PathBuf, data: &Dataset) -> Result<Self> {
         let state = State {
             name: name.to_owned(),
