@@ -168,21 +168,36 @@ impl ClosedBlock {
         self.columns[self.runs..].sort_by_key(|column| (column.start, column.from));
         let count = self.columns.len();
         let Record { x, origin, noise, rho, exp_u, mean, variance, gx, gd, gm, gv } = &mut self.record;
-        for list in [x, noise, rho, exp_u, mean, variance, gx, gd, gm, gv] {
+        let values = self.steps * count * n;
+        // What is read of these was written in the same evaluation.
+        for list in [x, noise, rho, exp_u, mean, variance] {
+            list.resize(values, 0.0);
+        }
+        for list in [gx, gd, gm, gv] {
             list.clear();
-            list.resize(self.steps * count * n, 0.0);
+            list.resize(values, 0.0);
         }
         origin.clear();
-        origin.resize(self.steps * count * n, Origin::Given as u8);
-        let grow = |list: &mut AVec<f64>, len: usize| {
+        origin.resize(values, Origin::Given as u8);
+        // The same holds for states and deltas, megabytes that would take longer to clear than to use, but for the ends below.
+        let (rows, n_c, n_out) = (packed.rows, packed.n_c, packed.n_out);
+        let (states, deltas) = (packed.state_stride, packed.delta_stride);
+        self.states.resize(((self.steps + 2) * count + 1) * states, 0.0);
+        self.deltas.resize(((self.steps + 2) * count + 1) * deltas, 0.0);
+        for column in 0..count {
+            let last = self.steps * count + column;
+            // No input comes after the last step, and nothing comes back from there; only the outputs' biases want their constant.
+            self.states[last * states + rows..][..packed.n_x].fill(0.0);
+            self.states[last * states + rows + packed.n_x] = 1.0;
+            self.deltas[last * deltas..][..n_c].fill(0.0);
+        }
+        let clear = |list: &mut AVec<f64>, len: usize| {
             list.clear();
             list.resize(len, 0.0);
         };
-        grow(&mut self.states, ((self.steps + 2) * count + 1) * packed.state_stride);
-        grow(&mut self.deltas, ((self.steps + 2) * count + 1) * packed.delta_stride);
-        grow(&mut self.internal, count * packed.rows);
-        grow(&mut self.drive, count * packed.rows.max(packed.to_input.rows()));
-        grow(&mut self.outputs, count * padded(packed.n_out));
+        clear(&mut self.internal, count * rows);
+        clear(&mut self.drive, count * rows.max(packed.to_input.rows()));
+        clear(&mut self.outputs, count * padded(n_out).max(deltas));
         self.initial.clear();
         self.initial.resize(self.runs * packed.n_c, 0.0);
         self.ln_likelihood.clear();
@@ -261,10 +276,6 @@ impl EvaluateClosed<'_> {
         let (packed, features) = (self.packed, self.features);
         let (n, n_c, rows, stride) = (packed.n_y, packed.n_c, packed.rows, packed.state_stride);
         let count = self.block.columns.len();
-        // The constant that the last outputs' biases are multiplied with.
-        for column in 0..count {
-            self.block.states[(self.block.steps * count + column) * stride + rows + packed.n_x] = 1.0;
-        }
         for run in 0..self.block.runs {
             let from = self.block.columns[run].run * n_c;
             self.block.internal[run * rows..][..n_c].copy_from_slice(&self.starts[from..from + n_c]);
@@ -291,8 +302,7 @@ impl EvaluateClosed<'_> {
             multiply(simd, product, &mut block.drive);
             advance(simd, packed, &block.drive, &mut block.internal, next, running);
 
-            let matrices = [&packed.outputs_from_input, &packed.outputs];
-            let sources = [Columns { values: &next[rows..], stride }, Columns { values: next, stride }];
+            let (matrices, sources) = ([&packed.outputs], [Columns { values: next, stride }]);
             let product = Product { matrices, sources, columns: running, start: &packed.output_bias, ahead: &[] };
             multiply(simd, product, &mut block.outputs);
             for column in 0..running {
@@ -341,6 +351,7 @@ impl EvaluateClosed<'_> {
         if k >= steps {
             // It has ended.
             self.block.states[state..state + packed.n_x].fill(0.0);
+            self.block.record.x[at..at + n].fill(0.0);
             return;
         }
         let is_copy = column != from && k >= start;
@@ -444,7 +455,7 @@ impl EvaluateClosed<'_> {
     fn back<S: Simd>(&mut self, simd: S) {
         let (packed, features) = (self.packed, self.features);
         let (n, n_c, rows) = (packed.n_y, packed.n_c, packed.rows);
-        let (stride, inputs) = (packed.delta_stride, packed.to_input.rows());
+        let (stride, inputs, sums) = (packed.delta_stride, packed.to_input.rows(), packed.backward.rows());
         let block = &mut *self.block;
         let count = block.columns.len();
         for k in (0..=block.steps).rev() {
@@ -510,29 +521,34 @@ impl EvaluateClosed<'_> {
                     }
                 }
             }
-            let after = &block.deltas[k * count * stride..][..count * stride];
+            // Of what begins here no output was made before, nor of c_0.
+            for column in before..running {
+                block.deltas[(k * count + column) * stride + n_c..][..packed.n_out].fill(0.0);
+            }
+            let (earlier, after) = block.deltas.split_at_mut(k * count * stride);
             let (matrices, sources) = ([&packed.backward], [Columns { values: after, stride }]);
             let product = Product { matrices, sources, columns: running, start: &packed.zeros, ahead: &[] };
             multiply(simd, product, &mut block.drive);
             let states = &block.states[k * count * packed.state_stride..];
-            // d/du_k, in the internal states' place: they are used up.
-            block.outputs.clear();
-            block.outputs.resize(running * stride, 0.0);
-            retreat(simd, packed, &block.drive, states, after, &mut block.outputs, running);
-            if k == 0 {
-                for run in 0..block.runs {
-                    let own = &block.outputs[run * stride..][..n_c];
-                    block.internal[run * rows..][..n_c].copy_from_slice(own);
-                }
-                return;
+            // d/du_k. That of columns which were there before goes into the row before; its outputs are written after it.
+            if k > 0 {
+                let to = &mut earlier[(k - 1) * count * stride..];
+                retreat(simd, packed, &block.drive, states, after, to, before);
             }
-            for column in 0..running {
-                // What begins here was a copy of its run.
-                let to = (k - 1) * count
-                    + if block.columns[column].start == k { block.columns[column].from } else { column };
-                let to = &mut block.deltas[to * stride..][..n_c];
-                for (to, own) in to.iter_mut().zip(&block.outputs[column * stride..][..n_c]) {
-                    *to += own;
+            if before == running {
+                continue;
+            }
+            // What begins here was a copy of its run, whose share it adds to; and the runs began with u_0.
+            let (first, width) = (before * stride, running - before);
+            let (drive, states) = (&block.drive[before * sums..], &states[before * packed.state_stride..]);
+            retreat(simd, packed, drive, states, &after[first..], &mut block.outputs, width);
+            for (column, own) in (before..running).zip(block.outputs.chunks_exact(stride)) {
+                match k {
+                    0 => block.internal[column * rows..][..n_c].copy_from_slice(&own[..n_c]),
+                    _ => {
+                        let to = ((k - 1) * count + block.columns[column].from) * stride;
+                        earlier[to..to + n_c].iter_mut().zip(own).for_each(|(to, own)| *to += own);
+                    }
                 }
             }
         }

@@ -272,6 +272,31 @@ fn neither_threads_nor_instruction_sets_change_a_bit() {
     }
 }
 
+/// Records are not cleared between evaluations: what is read was written before in the same one.
+#[test]
+fn what_earlier_evaluations_left_behind_changes_nothing() {
+    for delay in [1, 2] {
+        for (name, topology) in topologies(delay) {
+            let (data, (network, states)) = (data(true), network(&topology));
+            let request = request(&topology, &data, Some(ClosedLoopTerm::new(3, 0.4)));
+            let own = runs(&data, delay, request.closed_loop);
+            let fresh = evaluate(&request, &network, &own, &states, &Engine::serial());
+            let mut objective = Engine::serial().objective(&request).unwrap();
+            let mut found = Evaluation::new(&topology);
+            // All states and predictions non-finite, and columns that begin and end elsewhere.
+            let mut broken = network.clone();
+            broken.parameters.as_mut_slice().fill(f64::NAN);
+            objective.set_parameters(&broken.parameters);
+            let elsewhere: Vec<Run> = own.iter().map(|run| run.released(Release::new(delay + 2, 3))).collect();
+            objective.evaluate(&elsewhere, &states, Want::Everything, &mut found);
+            assert!(found.ln_likelihood.iter().all(|value| value.is_nan()), "{name}");
+            objective.set_parameters(&network.parameters);
+            objective.evaluate(&own, &states, Want::Everything, &mut found);
+            assert_eq!(found, fresh, "{name}, delay {delay}");
+        }
+    }
+}
+
 #[test]
 fn senseless_closed_loops_are_refused() {
     let (topology, data) = (topologies(1).swap_remove(0).1, data(false));
