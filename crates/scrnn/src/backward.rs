@@ -16,34 +16,42 @@ use pulp::Simd;
 use crate::batch::Block;
 use crate::kernels::element::Element;
 use crate::kernels::outer::{Rows, Taken, accumulate};
-use crate::kernels::panels::{Columns, Product, Way, multiply_into};
+use crate::kernels::panels::{Columns, End, Product, Way, multiply_into};
 use crate::packed::Packed;
 use crate::trajectory::Trajectory;
 
-/// `before <- (1 - c^2) sum + (1 - 1/tau) after` for the context units of `columns` columns (2.22).
+/// What a product back may know of those around it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pass<'a, E = f64> {
+    /// Whether it is an odd one: even and odd ones walk the weights in opposite directions.
+    pub is_odd: bool,
+    /// The states of the one before it, if they have left the cache.
+    pub ahead: &'a [E],
+}
+
+impl<E> Default for Pass<'_, E> {
+    fn default() -> Self {
+        Self { is_odd: false, ahead: &[] }
+    }
+}
+
+/// One product back, for `columns` columns (2.22): `after` holds their delta rows, `states` the contexts that they were made from.
+/// Leaves d/du of these contexts in the delta rows `before`; their outputs' places hold nothing of use.
 #[inline(always)]
 pub(crate) fn retreat<S: Simd, E: Element>(
     simd: S,
     packed: &Packed<E>,
-    sums: &[E],
-    states: &[E],
     after: &[E],
+    states: &[E],
     before: &mut [E],
     columns: usize,
+    Pass { is_odd, ahead }: Pass<'_, E>,
 ) {
-    let rows = packed.backward.rows();
-    let decay = E::vectors::<S>(&packed.decay[..rows]);
-    for column in 0..columns {
-        let delta = column * packed.delta_stride;
-        let sums = E::vectors::<S>(&sums[column * rows..][..rows]);
-        let c = E::vectors::<S>(&states[column * packed.state_stride..][..rows]);
-        let after = E::vectors::<S>(&after[delta..][..rows]);
-        let before = E::vectors_mut::<S>(&mut before[delta..][..rows]);
-        for ((((before, after), c), sum), decay) in before.iter_mut().zip(after).zip(c).zip(sums).zip(decay) {
-            let slope = E::negate_mul_add(simd, *c, *c, E::splat(simd, E::ONE));
-            *before = E::mul_add(simd, slope, *sum, E::mul(simd, *decay, *after));
-        }
-    }
+    let after = Columns { values: after, stride: packed.delta_stride };
+    let c = Columns { values: states, stride: packed.state_stride };
+    let product = Product { matrices: [&packed.backward], sources: [after], columns, start: &packed.zeros, ahead };
+    let way = Way { backwards: is_odd, end: End::Slope { keep: &packed.decay, c, after } };
+    multiply_into(simd, product, way, before);
 }
 
 /// Goes back through the products of `range`, a segment of the span that starts at `span_start` and has these `states`. The delta row
@@ -84,13 +92,9 @@ pub(crate) fn run<S: Simd, E: Element>(
         }
         let at = (k - span_start) * n * state_stride;
         let own = &states[at..at + n * state_stride];
-        let sources = [Columns { values: after, stride: delta_stride }];
-        let matrices = [&packed.backward];
         // The states of the step before: they were written long ago, and left the cache since.
         let ahead = &states[at - (n * state_stride).min(at)..at];
-        let product = Product { matrices, sources, columns: active, start: &packed.zeros, ahead };
-        multiply_into(simd, product, Way { backwards: k % 2 == 1, keep: None }, &mut trajectory.drive);
-        retreat(simd, packed, &trajectory.drive, own, after, before, active);
+        retreat(simd, packed, after, own, before, active, Pass { is_odd: k % 2 == 1, ahead });
     }
 }
 

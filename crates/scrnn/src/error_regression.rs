@@ -36,7 +36,7 @@
 use aligned_vec::AVec;
 use pulp::{Simd, WithSimd};
 
-use crate::backward::retreat;
+use crate::backward::{Pass, retreat};
 use crate::engine::{Engine, InstructionSet, Run};
 use crate::error::{Error, Result};
 use crate::features::Features;
@@ -513,19 +513,15 @@ impl ErrorRegression {
                     copy_few(&mut outputs[n_x..], &self.variance_delta[(row - 1) * n_x..][..n_x]);
                 }
             }
-            let after = &self.deltas[row * stride..][..stride];
-            let (matrices, sources) = ([&packed.backward], [Columns { values: after, stride }]);
-            let product = Product { matrices, sources, columns: 1, start: &packed.zeros, ahead: &[] };
-            multiply(simd, product, &mut self.drive);
             let states = &self.states[row * packed.state_stride..];
             if row == 0 {
                 // Nothing lies before the tail: its gradient takes the place of the row after it.
-                self.drive_with_input.copy_from_slice(&after[..packed.rows]);
-                retreat(simd, packed, &self.drive, states, &self.drive_with_input, &mut self.deltas, 1);
+                self.drive_with_input.copy_from_slice(&self.deltas[..packed.rows]);
+                retreat(simd, packed, &self.drive_with_input, states, &mut self.deltas, 1, Pass::default());
                 return;
             }
             let (before, after) = self.deltas.split_at_mut(row * stride);
-            retreat(simd, packed, &self.drive, states, after, &mut before[(row - 1) * stride..], 1);
+            retreat(simd, packed, after, states, &mut before[(row - 1) * stride..], 1, Pass::default());
             // The row's input was predicted xi steps before, perhaps in the window.
             if row > self.delay {
                 let du = &before[(row - 1) * stride..][..stride];

@@ -20,7 +20,7 @@ use crate::dataset::Sequence;
 use crate::error::{Error, Result};
 use crate::features::{Features, Past};
 use crate::kernels::element::Element;
-use crate::kernels::panels::{Columns, Product, Way, multiply_into};
+use crate::kernels::panels::{Columns, End, Product, Way, multiply_into};
 use crate::network::Network;
 use crate::packed::Packed;
 use crate::parameters::Block as Parameter;
@@ -172,26 +172,15 @@ pub(crate) fn start<E: Element>(packed: &Packed<E>, block: &Block, initial: &[f6
     }
 }
 
-/// Prepares a span: its inputs, and the context where it starts. A column that has ended needs no input.
+/// Prepares a span that starts in the running internal states: the context there.
 #[inline(always)]
 pub(crate) fn enter_span<S: Simd, E: Element>(
     simd: S,
     packed: &Packed<E>,
     block: &Block,
-    sequences: &[Sequence],
-    span: std::ops::Range<usize>,
     trajectory: &mut Trajectory<E>,
 ) {
-    let (n, stride) = (block.columns(), packed.state_stride);
-    for (column, &sequence) in block.sequences.iter().enumerate() {
-        let inputs = sequences[sequence].values().chunks_exact(packed.n_x).skip(span.start).take(span.len());
-        for (x, states) in inputs.zip(trajectory.states.chunks_exact_mut(n * stride)) {
-            let state = &mut states[column * stride..(column + 1) * stride];
-            E::take(&mut state[packed.rows..packed.rows + packed.n_x], x);
-            state[packed.rows + packed.n_x] = E::ONE;
-        }
-    }
-    activate(simd, packed, &trajectory.internal, &mut trajectory.states, n);
+    activate(simd, packed, &trajectory.internal, &mut trajectory.states, block.columns());
 }
 
 /// Runs the products of `range`, which lies in the span that starts at `span_start`; `record` keeps the outputs.
@@ -199,25 +188,36 @@ pub(crate) fn enter_span<S: Simd, E: Element>(
 pub(crate) fn run<S: Simd, E: Element>(
     simd: S,
     packed: &Packed<E>,
-    block: &Block,
+    (block, sequences): (&Block, &[Sequence]),
     range: std::ops::Range<usize>,
     span_start: usize,
     record: bool,
     trajectory: &mut Trajectory<E>,
 ) {
     let (n, stride, rows) = (block.columns(), packed.state_stride, packed.rows);
-    let (n_y, n_c) = (packed.n_y, packed.n_c);
+    let (n_x, n_y, n_c) = (packed.n_x, packed.n_y, packed.n_c);
     let variance = packed.n_out > n_y;
     for k in range {
         let active = block.active(k);
         let at = (k - span_start) * n * stride;
-        let (now, next) = trajectory.states[at..at + 2 * n * stride].split_at_mut(n * stride);
+        let (now, later) = trajectory.states[at..].split_at_mut(n * stride);
+        let (next, ahead) = later.split_at_mut(n * stride);
+        for column in 0..active {
+            // A column that ends here has no input any more, and needs none.
+            if let Some(x) = sequences[block.sequences[column]].values().get(k * n_x..(k + 1) * n_x) {
+                let inputs = &mut now[column * stride + rows..][..n_x + 1];
+                E::take(&mut inputs[..n_x], x);
+                inputs[n_x] = E::ONE;
+            }
+        }
         let sources = [Columns { values: &now[rows..], stride }, Columns { values: now, stride }];
         let internal = &mut trajectory.internal[..n * rows];
         let matrices = [&packed.from_input, &packed.from_context];
-        let product = Product { matrices, sources, columns: active, start: &packed.bias, ahead: &[] };
+        // Where the next step writes: that was read long ago, and left the cache since.
+        let ahead = &ahead[..(n * stride).min(ahead.len())];
+        let product = Product { matrices, sources, columns: active, start: &packed.bias, ahead };
         // u <- (1 - 1/tau) u + drive, at the end of each sum.
-        let way = Way { backwards: k % 2 == 1, keep: Some(&packed.decay) };
+        let way = Way { backwards: k % 2 == 1, end: End::Keep(&packed.decay) };
         multiply_into(simd, product, way, internal);
         activate(simd, packed, internal, next, active);
         if record && k > 0 {

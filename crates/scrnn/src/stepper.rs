@@ -9,7 +9,7 @@ use pulp::Simd;
 use crate::forward::activate;
 use crate::kernels::activation::{exp, tanh_rows};
 use crate::kernels::padded;
-use crate::kernels::panels::{Columns, Product, Way, multiply, multiply_into};
+use crate::kernels::panels::{Columns, End, Product, Way, multiply, multiply_into};
 use crate::packed::Packed;
 
 /// Copies of one network at one moment.
@@ -86,7 +86,7 @@ impl Stepper {
             start: &packed.bias,
             ahead: &[],
         };
-        let way = Way { keep: Some(&packed.decay), ..Way::default() };
+        let way = Way { end: End::Keep(&packed.decay), ..Way::default() };
         multiply_into(simd, product, way, &mut self.internal);
         activate(simd, packed, &self.internal, &mut self.states, columns);
 

@@ -63,8 +63,6 @@ pub(crate) struct Trajectory<E: Element = f64> {
     pub states: AVec<E>,
     /// [column][rows]: the running internal states.
     pub internal: AVec<E>,
-    /// [column][rows]: what the products of one step give.
-    pub drive: AVec<E>,
     /// [span][column][rows]: internal states where spans start.
     pub span_starts: AVec<E>,
     /// [step][column][channel]: y, then d ln L / d u of the mean units.
@@ -86,7 +84,6 @@ impl<E: Element> Trajectory<E> {
         Self {
             states: own(),
             internal: own(),
-            drive: own(),
             span_starts: own(),
             mean: scores(),
             variance: scores(),
@@ -105,7 +102,6 @@ impl<E: Element> Trajectory<E> {
         // One more row than is read, for products that read shifted rows.
         grow(&mut self.states, ((cut.span + 1) * n + 1) * packed.state_stride);
         grow(&mut self.internal, n * packed.rows);
-        grow(&mut self.drive, n * packed.rows);
         grow(&mut self.span_starts, cut.spans() * n * packed.rows);
         grow(&mut self.mean, block.steps() * n * packed.n_y);
         grow(&mut self.variance, block.steps() * n * channels);

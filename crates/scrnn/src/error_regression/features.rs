@@ -5,7 +5,7 @@ use aligned_vec::AVec;
 use pulp::Simd;
 
 use super::ErrorRegression;
-use crate::backward::retreat;
+use crate::backward::{Pass, retreat};
 use crate::features::Features;
 use crate::kernels::panels::{Columns, Product, multiply};
 
@@ -73,11 +73,8 @@ impl ErrorRegression {
             }
 
             let (before, after) = self.deltas.split_at_mut(row * stride);
-            let (matrices, sources) = ([&packed.backward], [Columns { values: &*after, stride }]);
-            let product = Product { matrices, sources, columns: 1, start: &packed.zeros, ahead: &[] };
-            multiply(simd, product, &mut self.drive);
             let states = &self.states[row * packed.state_stride..];
-            retreat(simd, packed, &self.drive, states, after, &mut before[(row - 1) * stride..], 1);
+            retreat(simd, packed, after, states, &mut before[(row - 1) * stride..], 1, Pass::default());
 
             let du = &before[(row - 1) * stride..][..stride];
             let (matrices, sources) = ([&packed.to_input], [Columns { values: du, stride }]);
@@ -98,11 +95,7 @@ impl ErrorRegression {
         }
         // The tail: nothing lies before it.
         self.deltas[n_c..n_c + packed.n_out].fill(0.0);
-        let after = &self.deltas[..stride];
-        let (matrices, sources) = ([&packed.backward], [Columns { values: after, stride }]);
-        let product = Product { matrices, sources, columns: 1, start: &packed.zeros, ahead: &[] };
-        multiply(simd, product, &mut self.drive);
-        self.drive_with_input.copy_from_slice(&after[..packed.rows]);
-        retreat(simd, packed, &self.drive, &self.states, &self.drive_with_input, &mut self.deltas, 1);
+        self.drive_with_input.copy_from_slice(&self.deltas[..packed.rows]);
+        retreat(simd, packed, &self.drive_with_input, &self.states, &mut self.deltas, 1, Pass::default());
     }
 }

@@ -40,6 +40,25 @@ pub fn copy_few<T: Copy>(to: &mut [T], from: &[T]) {
     }
 }
 
+/// Asks for the cache line at `from`, so that it is near when it is read or written. Nothing waits for it, and any address will do:
+/// the instruction reads nothing that a program could see. Where it cannot be had without `unsafe`, nothing happens.
+#[inline(always)]
+pub(crate) fn fetch<S: pulp::Simd, E>(simd: S, from: *const E) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::_MM_HINT_T0;
+        // The type is known when this is compiled: what is left is the instruction.
+        let simd: &dyn std::any::Any = &simd;
+        if let Some(simd) = simd.downcast_ref::<pulp::x86::V4>() {
+            simd.sse._mm_prefetch::<_MM_HINT_T0>(from.cast());
+        } else if let Some(simd) = simd.downcast_ref::<pulp::x86::V3>() {
+            simd.sse._mm_prefetch::<_MM_HINT_T0>(from.cast());
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (simd, from);
+}
+
 /// How many accumulators a tile may hold: three quarters of the registers, the rest is for operands. Where there are no
 /// vector registers at all, one: then a tile is only code to compile.
 const fn accumulators<S: pulp::Simd>() -> usize {

@@ -12,7 +12,7 @@
 use pulp::{Simd, WithSimd};
 
 use super::element::{Element, lanes};
-use super::{accumulators, is_used, tallest};
+use super::{accumulators, fetch, is_used, tallest};
 
 /// Rows of values at equal distance. There must be one row more than is read, or as much memory behind the last.
 #[derive(Debug, Clone, Copy)]
@@ -28,6 +28,11 @@ pub struct Rows<'a, E = f64> {
 const MANY: usize = 768;
 /// Values of k in a block.
 const BLOCK: usize = 96;
+
+/// Bytes of deltas that the first-level cache still has when the next tile reads them.
+const NEAR: usize = 24 << 10;
+/// How many rows before they are read their lines are fetched.
+const AHEAD: usize = 8;
 
 /// Which rows are taken up: the first `width` of every `period`, `groups` times.
 #[derive(Debug, Clone, Copy)]
@@ -156,11 +161,18 @@ impl<E: Element, const M: usize, const N: usize> WithSimd for Tile<'_, E, M, N> 
         }
         let (height, k) = (M * lanes, job.from + first);
         let Taken { groups, width, period } = job.taken;
+        let is_far = groups * width * height * size_of::<E>() > NEAR;
         for group in 0..groups {
             let first = group * period;
             let deltas = &job.delta.values[first * job.delta.stride + job.row..][..width * job.delta.stride];
             let states = &job.state.values[first * job.state.stride + k..][..width * job.state.stride];
             for (delta, state) in deltas.chunks_exact(job.delta.stride).zip(states.chunks_exact(job.state.stride)) {
+                if is_far {
+                    for line in 0..height.div_ceil(E::ROWS) {
+                        fetch(simd, delta.as_ptr().wrapping_add(AHEAD * job.delta.stride + line * E::ROWS));
+                    }
+                    fetch(simd, state.as_ptr().wrapping_add(AHEAD * job.state.stride));
+                }
                 let delta = E::vectors::<S>(&delta[..height]);
                 let state = &state[..N];
                 for n in 0..N {

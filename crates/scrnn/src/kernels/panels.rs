@@ -12,17 +12,12 @@
 
 #![allow(clippy::needless_range_loop, reason = "loops over the constant sides of a tile unroll; indices say which")]
 
-use std::hint::black_box;
-
 use aligned_vec::AVec;
 use pulp::{Simd, WithSimd};
 
 use super::element::{Element, lanes};
-use super::{accumulators, is_used};
+use super::{accumulators, fetch, is_used};
 use crate::engine::InstructionSet;
-
-/// Values of a cache line.
-const LINE: usize = 8;
 
 /// A matrix in panels, zero-padded to whole vectors of rows.
 #[derive(Debug, Clone)]
@@ -148,7 +143,7 @@ pub struct Product<'a, const P: usize, E = f64> {
     pub columns: usize,
     /// What the sums start from.
     pub start: &'a [E],
-    /// What will be needed next and may be far away: the product reads it on the way, and so fetches it while it computes.
+    /// What will be needed next and may be far away: the product fetches it while it computes.
     pub ahead: &'a [E],
 }
 
@@ -158,18 +153,36 @@ pub struct Way<'a, E = f64> {
     /// From the last panel to the first. Walked forwards and backwards in turn, a cache that is a little too small still holds the
     /// panels that were read last.
     pub backwards: bool,
-    /// What share of `out` stays, one value a row: `out <- keep out + sums`. Without, `out <- sums`.
-    pub keep: Option<&'a [E]>,
+    /// What becomes of the sums.
+    pub end: End<'a, E>,
+}
+
+/// What becomes of a sum, as long as it is in a register. `keep` holds one value a row.
+#[derive(Debug, Clone, Copy)]
+pub enum End<'a, E = f64> {
+    /// `out <- sums`.
+    Sums,
+    /// `out <- keep out + sums`.
+    Keep(&'a [E]),
+    /// `out <- (1 - c^2) sums + keep after`: back through tanh. The columns of `out` are as far apart as those of `after`.
+    Slope {
+        /// What share of `after` is added.
+        keep: &'a [E],
+        /// The values of tanh.
+        c: Columns<'a, E>,
+        /// What is added.
+        after: Columns<'a, E>,
+    },
 }
 
 impl<E> Default for Way<'_, E> {
     /// Forwards, and the sums alone.
     fn default() -> Self {
-        Self { backwards: false, keep: None }
+        Self { backwards: false, end: End::Sums }
     }
 }
 
-/// Multiplies: `out` holds one row of as many values as the matrices have rows for each column.
+/// Multiplies: `out` holds one row of as many values as the matrices have rows for each column, see [`End`].
 #[inline(always)]
 pub fn multiply<S: Simd, E: Element, const P: usize>(simd: S, product: Product<'_, P, E>, out: &mut [E]) {
     multiply_into(simd, product, Way::default(), out);
@@ -183,9 +196,13 @@ pub fn multiply_into<S: Simd, E: Element, const P: usize>(
     way: Way<'_, E>,
     out: &mut [E],
 ) {
+    let lines = match product.ahead.len() {
+        0 => 0,
+        len => len.div_ceil(product.matrices[0].rows),
+    };
     match product.matrices[0].chains {
-        2 => walk::<S, E, P, 2>(simd, &Job { product, way }, out),
-        _ => walk::<S, E, P, 1>(simd, &Job { product, way }, out),
+        2 => walk::<S, E, P, 2>(simd, &Job { product, way, lines }, out),
+        _ => walk::<S, E, P, 1>(simd, &Job { product, way, lines }, out),
     }
 }
 
@@ -193,6 +210,8 @@ pub fn multiply_into<S: Simd, E: Element, const P: usize>(
 struct Job<'a, E, const P: usize> {
     product: Product<'a, P, E>,
     way: Way<'a, E>,
+    /// How many cache lines of what is ahead are fetched for each cache line of rows.
+    lines: usize,
 }
 
 #[inline(always)]
@@ -385,6 +404,34 @@ impl<S: Simd, E: Element, const H: usize, const C: usize, const N: usize, const 
             }
         }
     }
+
+    /// `out <- (1 - c^2) sums + keep after` of column `n`.
+    #[inline(always)]
+    fn slope(&self, simd: S, n: usize, [keep, c, after]: [&[E::Vector<S>]; 3], out: &mut [E::Vector<S>]) {
+        let (keep, c, after, out) = (&keep[..C * H], &c[..C * H], &after[..C * H], &mut out[..C * H]);
+        let one = E::splat(simd, E::ONE);
+        for panel in 0..C {
+            for h in 0..H {
+                let at = panel * H + h;
+                let slope = E::negate_mul_add(simd, c[at], c[at], one);
+                let kept = E::mul(simd, keep[at], after[at]);
+                out[at] = E::mul_add(simd, slope, self.sum(simd, panel, h, n), kept);
+            }
+        }
+    }
+}
+
+/// The columns of a tile one after the other, written out: a loop as long as this would not be unrolled, and the sums would be in memory.
+macro_rules! for_each_column {
+    ($columns:ident, $n:ident, $body:block) => {
+        for_each_column!($columns, $n, $body, 0, 1, 2, 3, 4, 5);
+    };
+    ($columns:ident, $n:ident, $body:block, $($each:literal),*) => {
+        $(if $each < $columns {
+            let $n = $each;
+            $body
+        })*
+    };
 }
 
 /// C panels of H vectors for each k: two k at a time, then the last k of an odd number.
@@ -418,6 +465,7 @@ impl<'a, S: Simd, E: Element, const H: usize, const C: usize> Weights<'a, S, E, 
 }
 
 impl<
+    'a,
     E: Element,
     const P: usize,
     const A: usize,
@@ -426,17 +474,18 @@ impl<
     const U: usize,
     const N: usize,
     const K: usize,
-> WithSimd for Tile<'_, E, P, A, T, B, U, N, K>
+> WithSimd for Tile<'a, E, P, A, T, B, U, N, K>
 {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { job, row, first, out } = self;
-        let Job { product, way } = job;
+        let Job { product, way, lines } = job;
         let height = (T * A + U * B) * lanes::<S, E>();
-        let mut ahead = product.ahead.as_chunks::<LINE>().0.iter().skip(row);
-        let mut fetched = E::ZERO;
+        // Each tile fetches its share.
+        let mut ahead = product.ahead.as_ptr().wrapping_add(row * lines);
+        let last = ahead.wrapping_add(height * lines);
         let starts = E::vectors::<S>(&product.start[row..row + height]);
         let mut tall = Sums::<S, E, A, T, N, K>::start(simd, starts);
         let mut short = Sums::<S, E, B, U, N, K>::start(simd, &starts[T * A..]);
@@ -452,8 +501,9 @@ impl<
                 paired[n] = &column[n].as_chunks::<2>().0[..inner / 2];
             }
             for k in 0..inner / 2 {
-                if let Some(line) = ahead.next() {
-                    fetched += line[0];
+                if ahead < last {
+                    fetch(simd, ahead);
+                    ahead = ahead.wrapping_add(E::ROWS);
                 }
                 for half in 0..2 {
                     for n in 0..N {
@@ -471,21 +521,37 @@ impl<
                 }
             }
         }
-        black_box(fetched);
         let rows = product.matrices[0].rows;
-        let keep = way.keep.map(|keep| E::vectors::<S>(&keep[row..row + height]));
-        for n in 0..N {
-            let out = E::vectors_mut::<S>(&mut out[(first + n) * rows + row..][..height]);
-            let (higher, lower) = out.split_at_mut(T * A);
-            match keep {
-                Some(keep) => {
-                    tall.blend(simd, n, keep, higher);
-                    short.blend(simd, n, &keep[T * A..], lower);
-                }
-                None => {
+        // A loop for each end: in one loop for all, the compiler would leave the sums in memory.
+        match way.end {
+            End::Sums => {
+                for n in 0..N {
+                    let out = E::vectors_mut::<S>(&mut out[(first + n) * rows + row..][..height]);
+                    let (higher, lower) = out.split_at_mut(T * A);
                     tall.store(simd, n, higher);
                     short.store(simd, n, lower);
                 }
+            }
+            End::Keep(keep) => {
+                let (keep, keep_lower) = E::vectors::<S>(&keep[row..row + height]).split_at(T * A);
+                for n in 0..N {
+                    let out = E::vectors_mut::<S>(&mut out[(first + n) * rows + row..][..height]);
+                    let (higher, lower) = out.split_at_mut(T * A);
+                    tall.blend(simd, n, keep, higher);
+                    short.blend(simd, n, keep_lower, lower);
+                }
+            }
+            End::Slope { keep, c, after } => {
+                let (keep, keep_lower) = E::vectors::<S>(&keep[row..row + height]).split_at(T * A);
+                for_each_column!(N, n, {
+                    let at = |it: Columns<'a, E>| &it.values[(first + n) * it.stride + row..][..height];
+                    let (c, c_lower) = E::vectors::<S>(at(c)).split_at(T * A);
+                    let (own, own_lower) = E::vectors::<S>(at(after)).split_at(T * A);
+                    let out = E::vectors_mut::<S>(&mut out[(first + n) * after.stride + row..][..height]);
+                    let (higher, lower) = out.split_at_mut(T * A);
+                    tall.slope(simd, n, [keep, c, own], higher);
+                    short.slope(simd, n, [keep_lower, c_lower, own_lower], lower);
+                });
             }
         }
     }

@@ -30,7 +30,7 @@ pub fn accumulate(delta: &[f64], rows: usize, state: &[f64], inner: usize) -> Ve
 mod tests {
     use super::super::element::Element;
     use super::super::outer::{self, Rows, Taken};
-    use super::super::panels::{self, Columns, Panels, Product, Way};
+    use super::super::panels::{self, Columns, End, Panels, Product, Way};
     use crate::engine::{InstructionSet, Run};
     use proptest::prelude::*;
     use pulp::{Simd, WithSimd};
@@ -50,7 +50,9 @@ mod tests {
         #[inline(always)]
         fn with_simd<S: Simd>(self, simd: S) {
             let (matrices, sources) = ([self.matrix], [self.source]);
-            let product = Product { matrices, sources, columns: self.columns, start: self.start, ahead: &[] };
+            let (columns, start) = (self.columns, self.start);
+            // What is ahead changes nothing.
+            let product = Product { matrices, sources, columns, start, ahead: self.source.values };
             panels::multiply_into(simd, product, self.way, self.out);
         }
     }
@@ -102,9 +104,18 @@ mod tests {
         run(Way::default(), &mut out);
         // Walked the other way, and with a half of what is there, which is then added.
         let mut again = out.clone();
-        run(Way { backwards: true, keep: Some(&vec![E::from_f64(0.5); E::padded(rows)]) }, &mut again);
+        let half = vec![E::from_f64(0.5); columns * E::padded(rows)];
+        run(Way { backwards: true, end: End::Keep(&half) }, &mut again);
         let blended = |once: &E| E::from_f64(0.5_f64.mul_add(once.to_f64(), once.to_f64()));
         assert!(out.iter().zip(&again).all(|(once, more)| *more == blended(once)));
+        // Back through tanh, where it is 1/2: three quarters, and a half of what is there.
+        let columns_of = |values| Columns { values, stride: E::padded(rows) };
+        run(
+            Way { backwards: true, end: End::Slope { keep: &half, c: columns_of(&half), after: columns_of(&out) } },
+            &mut again,
+        );
+        let sloped = |once: &E| E::from_f64(0.75_f64.mul_add(once.to_f64(), 0.5 * once.to_f64()));
+        assert!(out.iter().zip(&again).all(|(once, more)| *more == sloped(once)));
         let fast = out.chunks_exact(E::padded(rows)).flat_map(|column| wide(&column[..rows])).collect();
         (fast, super::multiply(&wide(&matrix), &wide(&source), inner, &wide(&start)))
     }

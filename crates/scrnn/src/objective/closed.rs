@@ -18,7 +18,7 @@ use pulp::{Simd, WithSimd};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::{ClosedLoopTerm, Run, Want};
-use crate::backward::retreat;
+use crate::backward::{Pass, retreat};
 use crate::dataset::Sequence;
 use crate::features::Features;
 use crate::forward::{activate, advance};
@@ -455,7 +455,7 @@ impl EvaluateClosed<'_> {
     fn back<S: Simd>(&mut self, simd: S) {
         let (packed, features) = (self.packed, self.features);
         let (n, n_c, rows) = (packed.n_y, packed.n_c, packed.rows);
-        let (stride, inputs, sums) = (packed.delta_stride, packed.to_input.rows(), packed.backward.rows());
+        let (stride, inputs) = (packed.delta_stride, packed.to_input.rows());
         let block = &mut *self.block;
         let count = block.columns.len();
         for k in (0..=block.steps).rev() {
@@ -526,22 +526,19 @@ impl EvaluateClosed<'_> {
                 block.deltas[(k * count + column) * stride + n_c..][..packed.n_out].fill(0.0);
             }
             let (earlier, after) = block.deltas.split_at_mut(k * count * stride);
-            let (matrices, sources) = ([&packed.backward], [Columns { values: after, stride }]);
-            let product = Product { matrices, sources, columns: running, start: &packed.zeros, ahead: &[] };
-            multiply(simd, product, &mut block.drive);
             let states = &block.states[k * count * packed.state_stride..];
             // d/du_k. That of columns which were there before goes into the row before; its outputs are written after it.
             if k > 0 {
                 let to = &mut earlier[(k - 1) * count * stride..];
-                retreat(simd, packed, &block.drive, states, after, to, before);
+                retreat(simd, packed, after, states, to, before, Pass::default());
             }
             if before == running {
                 continue;
             }
             // What begins here was a copy of its run, whose share it adds to; and the runs began with u_0.
             let (first, width) = (before * stride, running - before);
-            let (drive, states) = (&block.drive[before * sums..], &states[before * packed.state_stride..]);
-            retreat(simd, packed, drive, states, &after[first..], &mut block.outputs, width);
+            let states = &states[before * packed.state_stride..];
+            retreat(simd, packed, &after[first..], states, &mut block.outputs, width, Pass::default());
             for (column, own) in (before..running).zip(block.outputs.chunks_exact(stride)) {
                 match k {
                     0 => block.internal[column * rows..][..n_c].copy_from_slice(&own[..n_c]),

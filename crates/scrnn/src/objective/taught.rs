@@ -290,9 +290,9 @@ impl<E: Element, G: Gather<E>> Evaluate<'_, E, G> {
                 let kept = &mut trajectory.span_starts[index * n * packed.rows..(index + 1) * n * packed.rows];
                 kept.copy_from_slice(&trajectory.internal[..n * packed.rows]);
             }
-            forward::enter_span(simd, packed, block, inputs, span.clone(), trajectory);
+            forward::enter_span(simd, packed, block, trajectory);
             for segment in segments(*cut, &span) {
-                forward::run(simd, packed, block, segment.clone(), span.start, true, trajectory);
+                forward::run(simd, packed, (block, inputs), segment.clone(), span.start, true, trajectory);
                 score(simd, packed, targets, (block, &mut **found), segment, trajectory);
             }
         }
@@ -316,8 +316,8 @@ impl<E: Element, G: Gather<E>> Evaluate<'_, E, G> {
             if index + 1 < cut.spans() {
                 let kept = &trajectory.span_starts[index * n * packed.rows..(index + 1) * n * packed.rows];
                 trajectory.internal[..n * packed.rows].copy_from_slice(kept);
-                forward::enter_span(simd, packed, block, inputs, span.clone(), trajectory);
-                forward::run(simd, packed, block, span.clone(), span.start, false, trajectory);
+                forward::enter_span(simd, packed, block, trajectory);
+                forward::run(simd, packed, (block, inputs), span.clone(), span.start, false, trajectory);
             }
             relay.exchange(number, &mut trajectory.states);
             let states = relay.states(number);
