@@ -92,37 +92,54 @@ fn the_network_in_a_page_is_dragged_and_runs_as_the_program_lets_it_run() {
     let sine = root().join("assets/experiments/sinusoid_fast.toml").display().to_string();
     scrnn(folder.path(), &format!("train {sine} --epochs 20 --set data.sequences=1 --out one --quiet"));
     scrnn(folder.path(), &format!("train {sine} --epochs 20 --set data.sequences=2 --out two --quiet"));
+    scrnn(folder.path(), &format!("train {sine} --epochs 20 --set network.variance=false --out mean --quiet"));
     for (run, least) in [("cycle/seed-1", 3), ("one", 1), ("two", 2)] {
         scrnn(folder.path(), &format!("report {run}"));
         let Some(found) = used(folder.path(), &["drag", &format!("{run}/report.html")]) else { return };
-        assert_ne!(found["start"], found["dragged"], "{run}");
-        assert_ne!(found["dragged"], found["keyed"], "{run}");
-        assert_eq!(found["changed"], json!([true, true, true]), "{run}: a drag, noise and a push change what is drawn");
-        let generated = scrnn(folder.path(), &format!("generate {run} --no-noise --json"));
-        let generated: Value = serde_json::from_str(&generated).unwrap();
-        let sequences = generated["sequences"].as_array().unwrap();
-        let runs = found["runs"].as_array().unwrap();
-        assert!(runs.len() == sequences.len() && runs.len() >= least);
-        for (own, sequence) in runs.iter().zip(sequences) {
-            for part in ["mean", "variance"] {
-                let (own, library) = (own[part].as_array().unwrap(), sequence[part].as_array().unwrap());
-                assert!(own.len() >= 50);
-                for (step, (a, b)) in own.iter().zip(library).enumerate() {
-                    for (a, b) in numbers(a).into_iter().zip(numbers(b)) {
-                        assert!(
-                            (a - b).abs() <= 1e-6,
-                            "{run}, {part} at step {step}: {a} in the page, {b} in the library"
-                        );
-                    }
-                }
-            }
-        }
+        assert_eq!((&found["networks"], &found["can_choose"]), (&json!([""]), &json!(false)), "{run}");
+        dragged_as_generated(folder.path(), run, &found, least);
     }
     scrnn(folder.path(), &format!("train {sine} --epochs 20 --set training.members=2 --out mixture --quiet"));
     scrnn(folder.path(), "report mixture");
     let Some(found) = used(folder.path(), &["drag", "mixture/report.html"]) else { return };
     assert_eq!(found["changed"], json!([true, true, true]), "a mixture: {found}");
     assert!(numbers(&found["runs"][0]["mean"][49]).iter().all(|mean| mean.is_finite()), "{found}");
+
+    // All of them on the page of a comparison, where another network is chosen: with other channels, states and without variance.
+    let curves = root().join("assets/experiments/lissajous_fast.toml").display().to_string();
+    scrnn(folder.path(), &format!("train {curves} --epochs 20 --out curves --quiet"));
+    scrnn(folder.path(), "compare cycle/seed-1 one two mean curves --out page");
+    for (run, least) in [("one", 1), ("mean", 1), ("curves", 12), ("cycle/seed-1", 3), ("two", 2)] {
+        let name = run.rsplit('/').next().unwrap();
+        let Some(found) = used(folder.path(), &["drag", "page/report.html", name]) else { return };
+        assert!(found["can_choose"] == true && found["networks"].as_array().unwrap().len() == 5, "{run}: {found}");
+        let shown = json!({ ".orbit": name == "curves", ".noise": name != "mean" });
+        assert_eq!(found["shown"], shown, "{run}: no plane of one channel, no noise without variance");
+        dragged_as_generated(folder.path(), run, &found, least);
+    }
+}
+
+/// What a page said of a network that was dragged in it: everything moves, and its numbers are the library's.
+fn dragged_as_generated(folder: &Path, run: &str, found: &Value, least: usize) {
+    assert_ne!(found["start"], found["dragged"], "{run}");
+    assert_ne!(found["dragged"], found["keyed"], "{run}");
+    let noise = &found["shown"][".noise"];
+    assert_eq!(found["changed"], json!([true, noise, true]), "{run}: a drag, noise and a push change what is drawn");
+    let generated = scrnn(folder, &format!("generate {run} --no-noise --json"));
+    let generated: Value = serde_json::from_str(&generated).unwrap();
+    let (sequences, runs) = (generated["sequences"].as_array().unwrap(), found["runs"].as_array().unwrap());
+    assert!(runs.len() == sequences.len() && runs.len() >= least);
+    for (own, sequence) in runs.iter().zip(sequences) {
+        for part in if noise == true { &["mean", "variance"][..] } else { &["mean"] } {
+            let (own, library) = (own[part].as_array().unwrap(), sequence[part].as_array().unwrap());
+            assert!(own.len() >= 50);
+            for (step, (a, b)) in own.iter().zip(library).enumerate() {
+                for (a, b) in numbers(a).into_iter().zip(numbers(b)) {
+                    assert!((a - b).abs() <= 1e-6, "{run}, {part} at step {step}: {a} in the page, {b} in the library");
+                }
+            }
+        }
+    }
 }
 
 #[test]

@@ -58,6 +58,7 @@ pub const OPTIONS: &[(&str, &str, &str)] = &[
     ("reproduce", "seed", "reproduce sinusoid --epochs 1 --out r --overwrite"),
     ("reproduce", "epochs", "reproduce sinusoid --out r --overwrite"),
     ("report", "seed", "report run"),
+    ("compare", "networks", "compare run --out page"),
     ("convert", "period", "convert timed.csv converted.npz"),
     ("inspect", "period", "inspect timed.csv"),
 ];

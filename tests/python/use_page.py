@@ -1,7 +1,7 @@
 """Uses pages in a headless browser as a person would, and writes what they did as JSON on stdout.
 
     use_page.py step STEP.js FOLDER...      runs network.json of each folder along its samples.json, into browser.json
-    use_page.py drag PAGE                   drags the initial state, then runs every learned state without noise
+    use_page.py drag PAGE [NETWORK]         chooses the network, drags its initial state, runs every learned state without noise
     use_page.py live URL                    watches a training: what is drawn, and who is answered
     use_page.py view PAGE RECORDING BODY    plays the page to its end; where the body is drawn, and where the recording has it
     use_page.py poses PAGE BODY TIME...     where a body is at these times, in the world and on the canvas
@@ -60,8 +60,12 @@ def step(browser, script, folders):
     return {"folders": len(folders)}
 
 
-def drag(browser, file, problems):
+def drag(browser, file, network, problems):
     page = opened(browser, file, problems)
+    choice = page.locator("#playground .network")
+    networks = choice.locator("option").all_inner_texts()
+    if network is not None:
+        choice.select_option(label=network)
     runs = page.evaluate("""() => {
         const { data, run } = scrnnPlayground;
         return data.plane.points.map((_, k) => run({ internal: data.plane.internals[k], first: data.plane.begins[k], noise: false, push: 0 }));
@@ -78,10 +82,13 @@ def drag(browser, file, problems):
     dragged, after = page.evaluate("[...scrnnPlayground.state.at]"), orbit()
     handle.press("ArrowRight")
     keyed = page.evaluate("[...scrnnPlayground.state.at]")
-    page.locator("#playground .noise").check()
+    if page.locator("#playground .noise").is_visible():
+        page.locator("#playground .noise").check()
     noisy = orbit()
     page.locator("#playground .push").evaluate("node => { node.value = 80; node.dispatchEvent(new Event('input')); }")
     return {
+        "networks": networks, "can_choose": choice.is_visible(),
+        "shown": {part: page.locator(f"#playground {part}").first.is_visible() for part in (".orbit", ".noise")},
         "names": page.evaluate("scrnnPlayground.data.plane.names"), "runs": runs, "start": start, "dragged": dragged, "keyed": keyed,
         "changed": [before != after, after != noisy, noisy != orbit()],
     }
@@ -291,7 +298,7 @@ def main():
         if sys.argv[1] == "step":
             result = step(browser, sys.argv[2], sys.argv[3:])
         elif sys.argv[1] == "drag":
-            result = drag(browser, pathlib.Path(sys.argv[2]), problems)
+            result = drag(browser, pathlib.Path(sys.argv[2]), sys.argv[3] if len(sys.argv) > 3 else None, problems)
         elif sys.argv[1] == "live":
             result = live(browser, sys.argv[2], problems)
         elif sys.argv[1] == "poses":

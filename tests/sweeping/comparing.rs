@@ -3,6 +3,8 @@
 use std::fs;
 use std::time::{Duration, Instant};
 
+use serde_json::Value;
+
 use crate::{Place, SINE, thousand};
 
 fn sine(epochs: u32) -> String {
@@ -53,6 +55,57 @@ fn one_knob_is_a_curve_two_are_a_heat_map_and_the_best_is_named_over_all_seeds()
     assert!(html.contains("Each setting has one network only") && html.contains("No run has a page of its own"));
 }
 
+/// The networks that a page holds, by their names; none where there is nothing to play with.
+fn playable(html: &str) -> Vec<String> {
+    let Some((_, rest)) = html.split_once("id=\"playground-data\">") else { return Vec::new() };
+    let data: Value = serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap();
+    data["networks"].as_array().unwrap().iter().map(|one| one["name"].as_str().unwrap().to_owned()).collect()
+}
+
+#[test]
+fn a_page_holds_networks_the_best_of_each_setting_first_until_it_is_full_and_says_who_is_left_out() {
+    let sweep = "seeds = 2\n[grid]\n\"training.adam.rate\" = [1e-6, 1e-2]\n[then]\nreport = false\n";
+    let place = Place::new(&sine(150), sweep);
+    place.ends(0, "sweep s.toml --quiet");
+    let page = |more: &str| {
+        place.ends(0, &format!("compare runs/s --out page{more}"));
+        fs::read_to_string(place.path("page/report.html")).unwrap()
+    };
+    let html = page("");
+    let all = playable(&html);
+    let settings: Vec<&str> = all.iter().map(|name| name.split('/').next().unwrap()).collect();
+    assert_eq!(settings, ["rate=0.01", "rate=1e-6", "rate=0.01", "rate=1e-6"], "{all:?}");
+    assert!(html.contains("holds all 4 finished networks"));
+    // The best seed of a setting is its first.
+    let csv = fs::read_to_string(place.path("page/metrics.csv")).unwrap();
+    let nll = |run: &str| -> f64 {
+        let line = csv.lines().find(|line| line.starts_with(run)).unwrap();
+        line.split(',').nth(5).unwrap().parse().unwrap()
+    };
+    assert!(nll(&all[0]) <= nll(&all[2]) && nll(&all[1]) <= nll(&all[3]), "{all:?}: {csv}");
+    let html = page(" --networks 1");
+    assert!(playable(&html) == all[..1] && html.contains("3 more were not tried"));
+    let html = page(" --networks 0");
+    assert!(playable(&html).is_empty() && !html.contains("Play with them") && html.contains("script-src 'none'"));
+
+    // Networks of 1 to 1.6 MB each.
+    let sweep = "[grid]\n\"network.groups.context.units\" = [220, 230, 240, 250, 260, 1]\n[then]\nreport = false\n";
+    let place = Place::new(&sine(1), sweep);
+    place.ends(0, "sweep s.toml --quiet");
+    place.ends(0, "compare runs/s");
+    let html = fs::read_to_string(place.path("runs/s/report.html")).unwrap();
+    let held = playable(&html);
+    assert!(html.len() < 5_000_000 && (3..5).contains(&held.len()), "{} bytes, {held:?}", html.len());
+    assert!(html.contains(&format!("holds {} of 6 finished networks", held.len())));
+    let (_, left_out) = html.split_once("no room for their numbers in a page of less than 5 MB: ").unwrap();
+    let left_out = left_out.split_once("</p>").unwrap().0;
+    for units in [220, 230, 240, 250, 260] {
+        let name = format!("units={units}/seed-1");
+        assert_ne!(held.contains(&name), left_out.contains(&format!("{name} (1.")), "{name}: {left_out}");
+    }
+    assert!(html.contains("a single context unit has no plane of initial states: units=1/seed-1."));
+}
+
 #[test]
 fn a_page_of_a_thousand_networks_is_small_and_made_in_no_time() {
     let place = Place::new(&sine(200), "");
@@ -65,5 +118,6 @@ fn a_page_of_a_thousand_networks_is_small_and_made_in_no_time() {
     assert!(taken < Duration::from_secs(60), "{taken:?}");
     let html = fs::read_to_string(place.path("runs/s/report.html")).unwrap();
     assert_eq!(html.matches("/report.html\">").count(), 1000);
+    assert_eq!(playable(&html).len(), 12);
     assert_eq!(fs::read_to_string(place.path("runs/s/metrics.csv")).unwrap().lines().count(), 1001);
 }

@@ -13,5 +13,5 @@ pub mod view;
 mod writing;
 
 pub use blocks::{calibration_blocks, learning_curves};
-pub use playground::STEP;
+pub use playground::{Playground, STEP, Unplayable};
 pub use writing::write;

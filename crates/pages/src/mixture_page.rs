@@ -27,7 +27,7 @@ pub fn page(all: &[Trained], rows: &[Vec<Row>], engine: &Engine) -> Result<Page>
     let mut name = "a mixture".to_owned();
     // Data that are gone are no reason to show nothing of the networks.
     if let Some(Ok(source)) = all.first().map(|first| first.source(engine.threads())) {
-        sections.extend(playground::section(all, &source));
+        sections.extend(playground::section(all, &source.data));
     }
     if let Some(experiment) = &experiment {
         name.clone_from(&experiment.name);

@@ -99,7 +99,7 @@ pub fn page(trained: &Trained, source: &Source, rows: &[Row], seed: u64, engine:
         learning.push(Block::Sheet(Sheet { caption: "At the end".into(), head: Vec::new(), rows, note }));
     }
     let mut sections = vec![Section { title: "On its own".into(), blocks: alone }];
-    sections.extend(playground::section(std::slice::from_ref(trained), source));
+    sections.extend(playground::section(std::slice::from_ref(trained), data));
     sections.push(Section { title: capital(&ahead), blocks: predicted });
     sections.extend(judgement.as_ref().map(held_out::section));
     sections.extend(initial_state_plane(trained));

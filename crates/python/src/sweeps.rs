@@ -8,7 +8,7 @@ use scrnn::engine::InstructionSet;
 use scrnn_data::replace;
 use scrnn_run::failure::{Failure, Result};
 use scrnn_run::interrupt::Interrupt;
-use scrnn_sweep::compare::METRICS;
+use scrnn_sweep::compare::{METRICS, NETWORKS};
 use scrnn_sweep::plan::Plan;
 use scrnn_sweep::status::Status;
 use scrnn_sweep::working::{Context, Options, prepare, work_on};
@@ -90,7 +90,7 @@ pub fn sweep_status(py: Python<'_>, folder: PathBuf) -> PyResult<(String, String
 pub fn compare(py: Python<'_>, paths: Vec<PathBuf>, out: PathBuf) -> PyResult<(String, String)> {
     watched(py, &News::default(), || -> Result<(String, String)> {
         let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
-        let compared = scrnn_sweep::compare::compare(&paths, &out)?;
+        let compared = scrnn_sweep::compare::compare(&paths, &out, NETWORKS)?;
         std::fs::create_dir_all(&out).map_err(|error| Failure::disk("make the folder", &out, error))?;
         replace(&out.join(METRICS), compared.csv.as_bytes())?;
         scrnn_pages::write(&compared.page, &out)?;

@@ -1,12 +1,13 @@
 (() => {
   "use strict";
   const root = document.getElementById("playground");
-  const data = JSON.parse(document.getElementById("playground-data").textContent);
-  const net = scrnnStep(data.network), n = net.channels, delay = data.network.kind.delay;
+  const { networks } = JSON.parse(document.getElementById("playground-data").textContent);
   const find = (name) => root.querySelector("." + name);
   const levels = ["var(--level-0)", "var(--level-1)", "var(--level-2)", "var(--level-3)"];
   const make = scrnnMake;
-  const state = { at: [...data.plane.points[0]], nearest: 0, noise: false, seed: 1, push: 0, when: 20, channel: 0, steps: data.steps };
+  const state = { at: [0, 0], nearest: 0, noise: false, seed: 1, push: 0, when: 20, channel: 0, steps: 1 };
+  // The network that is played with, what runs it, and its plane: the room that is shown, and where a point of it lies.
+  let data, net, n, delay, room, place;
 
   // Random numbers of a normal distribution, the same for the same seed.
   const normal = (seed) => {
@@ -69,16 +70,20 @@
 
   // The plane of the initial states.
   const plane = find("plane");
-  const spread = [0, 1].map((k) => range(data.plane.points.map((point) => point[k])));
-  const room = spread.map(([a, b]) => [a - 0.15 * (b - a), b + 0.15 * (b - a)]);
   const [left, top, width, height] = [8, 18, 304, 274];
-  const place = axes(plane, [left, top, width, height], room[0], room[1], data.plane.label, false);
-  data.plane.points.forEach((point, k) => {
-    const [cx, cy] = place(point);
-    const dot = make(plane, "circle", { cx, cy, r: 4, class: "learned", fill: levels[(data.plane.kinds[k] || 0) % 4] });
-    make(dot, "title", {}, data.plane.names[k]);
-  });
   const handle = make(plane, "circle", { r: 9, class: "handle", tabindex: 0, role: "slider", "aria-label": "initial state: arrow keys move it" });
+  const drawPlane = () => {
+    const spread = [0, 1].map((k) => range(data.plane.points.map((point) => point[k])));
+    room = spread.map(([a, b]) => [a - 0.15 * (b - a), b + 0.15 * (b - a)]);
+    plane.replaceChildren();
+    place = axes(plane, [left, top, width, height], room[0], room[1], data.plane.label, false);
+    data.plane.points.forEach((point, k) => {
+      const [cx, cy] = place(point);
+      const dot = make(plane, "circle", { cx, cy, r: 4, class: "learned", fill: levels[(data.plane.kinds[k] || 0) % 4] });
+      make(dot, "title", {}, data.plane.names[k]);
+    });
+    plane.append(handle);
+  };
 
   const draw = () => {
     const [cx, cy] = place(state.at);
@@ -88,7 +93,7 @@
     state.nearest = apart.indexOf(Math.min(...apart));
     const name = data.plane.names[state.nearest];
     handle.setAttribute("aria-valuetext", `${short(state.at[0])}, ${short(state.at[1])}, nearest to ${name}`);
-    find("where").textContent = apart[state.nearest] === 0 ? `the state of ${name}` : `between the learned states; nearest is ${name}`;
+    find("where").textContent = apart[state.nearest] === 0 ? `the state of sequence ${name}` : `between the learned states; nearest is that of sequence ${name}`;
     const ran = run({ ...state, internal: internal(state.at), others: data.plane.others[state.nearest], first: data.plane.begins[state.nearest] });
     const time = (k) => k + delay + 1;
     const paint = find("time");
@@ -113,6 +118,8 @@
     contexts.replaceChildren();
     const at = axes(contexts, [46, 14, 430, 110], [0, state.steps + delay], [-1.05, 1.05], `contexts of ${units} units`);
     for (let j = 0; j < units; j++) make(contexts, "polyline", { class: "context", stroke: levels[j % 4], points: path(ran.context.map((c, k) => at([time(k), c[j]]))) });
+    make(contexts, "text", { x: 476, y: 135, class: "tick end" }, `step ${state.steps + delay}`);
+    make(contexts, "text", { x: 46, y: 135, class: "tick" }, "1");
     return ran;
   };
 
@@ -140,16 +147,39 @@
     if (node) node.addEventListener("input", () => { change(node); draw(); });
   };
   control("noise", (node) => { state.noise = node.checked; });
-  control("push", (node) => {
+  const push = (node) => {
     const [low, high] = data.ranges[state.channel];
     state.push = (node.value / 100) * (high - low);
-  });
+  };
+  control("push", push);
   control("when", (node) => { state.when = Number(node.value); });
   control("channel", (node) => { state.channel = Number(node.value); find("push").dispatchEvent(new Event("input")); });
   find("again").addEventListener("click", () => { state.seed++; draw(); });
-  data.network.channels.forEach((name, i) => find("channel").append(new Option(name, i)));
-  find("when").max = state.steps - 1;
-  draw();
+
+  // Another network begins from its own state of the sequence that is nearest; noise and push stay.
+  const choose = (k) => {
+    const before = data && data.plane.names[state.nearest];
+    data = networks[k];
+    net = scrnnStep(data.network);
+    n = net.channels;
+    delay = data.network.kind.delay;
+    state.at = [...data.plane.points[Math.max(0, data.plane.names.indexOf(before))]];
+    state.steps = data.steps;
+    if (state.channel >= n) state.channel = 0;
+    find("channel").replaceChildren(...data.network.channels.map((name, i) => new Option(name, i, false, i === state.channel)));
+    find("when").max = state.steps - 1;
+    state.when = Number(find("when").value);
+    push(find("push"));
+    for (const node of root.querySelectorAll(".noisy")) node.hidden = !data.network.kind.variance;
+    find("orbit").style.display = data.pair ? "" : "none";
+    find("about").textContent = data.about;
+    drawPlane();
+    draw();
+  };
+  networks.forEach(({ name }, k) => find("network").append(new Option(name, k)));
+  find("which").hidden = networks.length < 2;
+  find("network").addEventListener("input", (event) => choose(Number(event.target.value)));
+  choose(0);
   // For tests, and for whoever wants the numbers.
-  window.scrnnPlayground = { run: (options) => run({ ...state, internal: internal(state.at), others: data.plane.others[state.nearest], first: data.plane.begins[state.nearest], ...options }), state, draw, data, place };
+  window.scrnnPlayground = { run: (options) => run({ ...state, internal: internal(state.at), others: data.plane.others[state.nearest], first: data.plane.begins[state.nearest], ...options }), state, draw, choose, networks, get data() { return data; }, get place() { return place; } };
 })();

@@ -1,7 +1,5 @@
 //! Figures of a comparison: a curve or a heat map for each measure, learning curves over each other, closed loops and initial states.
 
-use std::collections::HashMap;
-
 use scrnn::analysis::principal_components::PrincipalComponents;
 use scrnn::dataset::Dataset;
 use scrnn::engine::Engine;
@@ -11,6 +9,7 @@ use scrnn_run::trained::Trained;
 use serde_json::Value;
 
 use super::collected::{Collected, Row};
+use super::learned::LearnedData;
 use super::statistics::{Summary, ranked};
 use crate::measures::{Better, Measure};
 use crate::plan::shown;
@@ -305,15 +304,12 @@ fn networks(collected: &Collected, order: &[usize]) -> Vec<(usize, Trained)> {
 }
 
 /// Closed loops and initial states of the settings beside each other.
-pub fn networks_beside_each_other(collected: &Collected, order: &[usize]) -> Vec<Block> {
+pub fn networks_beside_each_other(collected: &Collected, order: &[usize], learned: &mut LearnedData) -> Vec<Block> {
     let networks = networks(collected, order);
-    let mut learned: HashMap<String, Option<Dataset>> = HashMap::new();
     let (mut loops, mut planes) = (Vec::new(), Vec::new());
     for (setting, trained) in &networks {
         let name = collected.called(*setting);
-        let digest = trained.notes.as_ref().map(|notes| notes.data.digest.clone()).unwrap_or_default();
-        let data = learned.entry(digest).or_insert_with(|| trained.learned_data(0).ok());
-        loops.extend(closed_loop(trained, data.as_ref(), name));
+        loops.extend(closed_loop(trained, learned.of(trained), name));
         planes.extend(plane(trained, name));
     }
     let more = match order.len() > networks.len() {

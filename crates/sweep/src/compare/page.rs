@@ -4,6 +4,8 @@ use scrnn_report::{Block, Page, Section, Sheet};
 
 use super::collected::Collected;
 use super::figures::{learning, measure as figure_of, networks_beside_each_other, short};
+use super::learned::LearnedData;
+use super::playing::{Room, networks_to_play_with};
 use super::statistics::{Best, Pair, ranked, tests};
 use crate::measures::{Better, Measure};
 
@@ -15,11 +17,13 @@ const FIGURES: usize = 8;
 const TESTS: usize = 60;
 /// Links to pages.
 const LINKS: usize = 5000;
+/// Bytes of a page; what says which networks are left out comes on top.
+const BYTES: usize = 4_900_000;
 /// Runs that came to nothing, one by one.
 const LOST: usize = 100;
 
-/// Everything on one page.
-pub fn page(collected: &Collected, best: Option<&Best>) -> Page {
+/// Everything on one page, with so many networks in it to be played with.
+pub fn page(collected: &Collected, best: Option<&Best>, networks: usize) -> Page {
     let whole = collected.runs.iter().filter(|run| run.is_whole).count();
     let (runs, settings) = (collected.runs.len(), collected.settings.len());
     let lede = format!(
@@ -55,9 +59,17 @@ pub fn page(collected: &Collected, best: Option<&Best>) -> Page {
         shown.iter().take(3).filter_map(|measure| sheet_of_tests(collected, measure)).collect(),
     );
     push("Learning", learning(collected, &order).into_iter().collect());
-    push("Networks", networks_beside_each_other(collected, &order));
+    let mut learned = LearnedData::default();
+    push("Networks", networks_beside_each_other(collected, &order, &mut learned));
     push("Runs", links(collected));
-    Page { title: format!("Comparison: {}", collected.name), lede, sections }
+    let mut page = Page { title: format!("Comparison: {}", collected.name), lede, sections };
+    // What all the rest leaves of the page is for networks to play with, and stands before the links.
+    let bytes = BYTES.saturating_sub(page.html().len());
+    let blocks = networks_to_play_with(collected, &order, &mut learned, Room { networks, bytes });
+    if !blocks.is_empty() {
+        page.sections.insert(page.sections.len() - 1, Section { title: "Play with them".into(), blocks });
+    }
+    page
 }
 
 fn verdict(collected: &Collected, best: Option<&Best>) -> Vec<Block> {

@@ -73,7 +73,7 @@ pub struct Pair {
 }
 
 /// Which way is better, as a sign: less of `value * sign` is better.
-fn sign(measure: &Measure) -> f64 {
+pub fn sign(measure: &Measure) -> f64 {
     if measure.better == Better::Higher { -1.0 } else { 1.0 }
 }
 
