@@ -161,6 +161,47 @@ fn a_recording_is_played_to_its_end_and_its_hand_is_where_the_recording_has_it()
     assert_eq!((&found["turned"], &found["curves"]), (&json!(true), &json!(6)), "{found}");
 }
 
+/// A network that has hardly learned to follow: its hand meets the object at every second branching.
+const CLUMSY: &str = "name = \"clumsy\"\n[data]\ntask = \"interact\"\nsequences = 2\nsteps = 40\n[[network.groups]]\nname = \"c\"\nunits = 8\n\
+                      time_constant = 2.0\n[training]\nepochs = 5\noptimiser = \"adam\"\n";
+
+#[test]
+fn contacts_and_branchings_of_an_interaction_are_marked_when_its_recording_has_them() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("clumsy.toml"), CLUMSY).unwrap();
+    scrnn(folder.path(), "train clumsy.toml --out run --quiet");
+    scrnn(folder.path(), "simulate interact run --order LRLR --mcap world.mcap");
+    // The recording alone: in a folder of its own, without the run.
+    let alone = tempfile::tempdir().unwrap();
+    std::fs::rename(folder.path().join("world.mcap"), alone.path().join("world.mcap")).unwrap();
+    scrnn(alone.path(), "view world.mcap");
+    let Some(found) = used(alone.path(), &["marks", "world.html", "world.mcap"]) else { return };
+    let mut drawn: Vec<(String, f64, String)> = Vec::new();
+    for mark in found["drawn"].as_array().unwrap() {
+        assert!(mark["seen"] == true && mark["upright"] == true, "{mark}");
+        let words = mark["words"].as_str().unwrap();
+        let words = words.rsplit_once(" at ").unwrap().0;
+        drawn.push((mark["kind"].as_str().unwrap().to_owned(), mark["time"].as_f64().unwrap(), words.to_owned()));
+    }
+    drawn.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let recorded = found["recorded"].as_array().unwrap();
+    let of = |kind: &str| recorded.iter().filter(|one| one[0] == kind).count();
+    assert!(of("contact") > 10 && of("sequence") == 1, "{recorded:?}");
+    let branchings = |one: &&Value| one[2].as_str().unwrap().starts_with("branching");
+    assert_eq!(recorded.iter().filter(branchings).count(), 4, "{recorded:?}");
+    assert_eq!(drawn.len(), recorded.len());
+    for ((kind, time, words), one) in drawn.iter().zip(recorded) {
+        // An event has its values behind its name.
+        let (own, at) = (one[2].as_str().unwrap(), one[1].as_f64().unwrap());
+        let same = if kind == "contact" { *words == format!("{own} touch") } else { words.starts_with(own) };
+        assert!(one[0] == *kind && same, "{kind} {words} at {time}, recorded {one}");
+        assert!((time - at).abs() < 1e-9, "{kind} {words} at {time}, recorded at {at}");
+    }
+    let told = &found["told"][0];
+    assert_eq!(told, "branching 1 to the left, at 2.0 s");
+    assert!(!found["text"].as_str().unwrap().contains("contacts are not marked"), "{found}");
+}
+
 #[test]
 fn a_recording_of_ros_with_joint_states_alone_shows_the_hand_where_forward_kinematics_has_it() {
     let folder = tempfile::tempdir().unwrap();

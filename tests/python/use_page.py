@@ -4,6 +4,7 @@
     use_page.py drag PAGE [NETWORK]         chooses the network, drags its initial state, runs every learned state without noise
     use_page.py live URL                    watches a training: what is drawn, and who is answered
     use_page.py view PAGE RECORDING BODY    plays the page to its end; where the body is drawn, and where the recording has it
+    use_page.py marks PAGE RECORDING        what the page marks under its time bar, and what the recording has at which times
     use_page.py poses PAGE BODY TIME...     where a body is at these times, in the world and on the canvas
     use_page.py motion URL                  watches a robot or a stream: what is drawn, and whether a lost connection comes back
     use_page.py many URL                    watches many trainings until all are over
@@ -139,9 +140,45 @@ def view(browser, file, recording, body, problems):
     return {
         "length": page.evaluate("scrnnView.data.length"), "time": page.evaluate("scrnnView.time()"), "pictures": own,
         "projected": projected, "drawn": drawn, "turned": moved != turned, "bodies": page.evaluate("scrnnView.bodies.length"),
-        "curves": page.locator("#view .signals svg").count(), "marks": page.locator("#view .marks line").count(),
+        "curves": page.locator("#view .signals svg").count(), "marks": page.locator("#view .marks line:not(.hand)").count(),
         "canvas": [box["width"], box["height"]],
     }
+
+
+def happened(recording):
+    """Kind, time and words of all contacts, events and sequences, in the order of time; what touches all the time is no contact."""
+    from mcap.reader import make_reader
+
+    found, first, messages, touched = [], None, 0, {}
+    with open(recording, "rb") as file:
+        for _, channel, message in make_reader(file).iter_messages():
+            time = message.log_time
+            first = time if first is None else first
+            if channel.topic == "/contacts":
+                messages += 1
+                for contact in json.loads(message.data)["contacts"]:
+                    touched.setdefault(f"{contact['a']} and {contact['b']}", []).append(time)
+            elif channel.topic in ("/events", "/sequence"):
+                kind = "event" if channel.topic == "/events" else "sequence"
+                found.append([kind, time, json.loads(message.data)["name"]])
+    for pair, times in touched.items():
+        if len(times) <= 0.9 * messages:
+            found += [["contact", time, pair] for time in times]
+    return sorted([kind, (time - first) / 1e9, words] for kind, time, words in found)
+
+
+def marks(browser, file, recording, problems):
+    page = opened(browser, file, problems)
+    drawn = page.evaluate("""() => [...document.querySelectorAll("#view .marks line:not(.hand)")].map((line) => {
+        const [x1, x2] = ["x1", "x2"].map((name) => Number(line.getAttribute(name))), box = line.getBoundingClientRect();
+        return { kind: line.getAttribute("class"), time: (x1 / 1000) * scrnnView.data.length, words: line.textContent, upright: x1 === x2,
+                 seen: getComputedStyle(line).stroke !== "none" && box.height > 1 };
+    })""")
+    told = []
+    for _, time, _ in [one for one in happened(recording) if one[0] == "event"][:3]:
+        page.evaluate("time => scrnnView.go(time)", time)
+        told.append(page.locator("#view .now").inner_text())
+    return {"drawn": drawn, "recorded": happened(recording), "told": told, "text": page.locator("main").inner_text()}
 
 
 def poses(browser, file, body, times, problems):
@@ -301,6 +338,8 @@ def main():
             result = drag(browser, pathlib.Path(sys.argv[2]), sys.argv[3] if len(sys.argv) > 3 else None, problems)
         elif sys.argv[1] == "live":
             result = live(browser, sys.argv[2], problems)
+        elif sys.argv[1] == "marks":
+            result = marks(browser, pathlib.Path(sys.argv[2]), sys.argv[3], problems)
         elif sys.argv[1] == "poses":
             result = poses(browser, pathlib.Path(sys.argv[2]), sys.argv[3], sys.argv[4:], problems)
         elif sys.argv[1] == "motion":

@@ -36,7 +36,7 @@ const BODY: &str = r#"<canvas class="world" tabindex="0" role="img" aria-label="
 <button class="home" type="button">view from the front</button>
 </div>
 <p class="now" aria-live="off"></p>
-<svg class="marks" viewBox="0 0 1000 10" role="img" aria-label="When something happened"></svg>
+<svg class="marks" viewBox="0 0 1000 10" preserveAspectRatio="none" role="img" aria-label="When something happened"></svg>
 <div class="signals"></div>"#;
 
 /// What the recording tells of one moment after the other.

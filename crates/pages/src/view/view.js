@@ -40,6 +40,7 @@
   const marks = find("marks");
   for (const { pair, times } of data.contacts) for (const time of times) make(make(marks, "line", { class: "contact", x1: across(time), x2: across(time), y1: 5, y2: 10 }), "title", {}, `${pair} touch at ${time.toFixed(1)} s`);
   for (const [kind, list] of [["event", data.events], ["sequence", data.sequences]]) for (const [time, words] of list) make(make(marks, "line", { class: kind, x1: across(time), x2: across(time), y1: 0, y2: kind === "event" ? 6 : 10, "stroke-width": 2 }), "title", {}, `${words} at ${time.toFixed(1)} s`);
+  const nowMark = make(marks, "line", { class: "hand", y1: 0, y2: 10 });
 
   const hands = [];
   for (const { name, sensed, mean, variance } of data.signals) {
@@ -67,6 +68,7 @@
     clock.value = `${now.toFixed(1)} s`;
     bar.setAttribute("aria-valuetext", `${now.toFixed(1)} of ${data.length.toFixed(1)} seconds`);
     for (const hand of hands) { const x = 4 + (292 * now) / length; hand.setAttribute("x1", x); hand.setAttribute("x2", x); }
+    for (const end of ["x1", "x2"]) nowMark.setAttribute(end, across(now));
     const past = happenings.filter(([time]) => time <= now + 1e-9);
     find("now").textContent = past.length ? `${past[past.length - 1][1]}, at ${past[past.length - 1][0].toFixed(1)} s` : "";
     scene.paint();
