@@ -116,6 +116,19 @@ fn a_reproduction_tells_what_it_is_at_and_ctrl_c_ends_it_there() {
 
 #[cfg(unix)]
 #[test]
+fn ctrl_c_ends_the_fit_of_the_mixture_that_reaching_is_compared_with() {
+    let place = Place::new();
+    let line = "reproduce reach --epochs 1 --out reach";
+    let watched = Watched::start(&place, line);
+    watched.until("a Gaussian mixture of 41 components");
+    let (took, code, said) = watched.interrupt();
+    assert!(took < ENDED && code == Some(130), "{took:?}, {code:?}: {said}");
+    assert!(said.contains("the same command goes on"), "{said}");
+    assert!(place.path("reach/seed-1/checkpoint.safetensors").exists() && !place.path("reach/report.html").exists());
+}
+
+#[cfg(unix)]
+#[test]
 fn the_trial_of_how_long_to_learn_tells_where_it_is_and_can_be_ended() {
     let place = Place::new();
     // Noisy waves, so that the recipe asks.

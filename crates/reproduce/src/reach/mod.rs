@@ -153,7 +153,7 @@ impl Study for Reach {
         };
         let constant: Vec<f64> = (0..n).map(mean_variance).collect();
 
-        let company = Company::new(networks, seed, engine)?;
+        let company = Company::new(networks, seed, desk)?;
         let mut places = [&POSITIONS[..], &BETWEEN].concat();
         places.extend(places_between(seed, 4));
         let frozen = gaze_at(&nao::load_one_armed()?, POSITIONS[1])?;

@@ -8,7 +8,7 @@ use scrnn::engine::{Engine, InstructionSet};
 use scrnn::initialization::initialize;
 use scrnn_report::Page;
 use scrnn_run::interrupt::Interrupt;
-use scrnn_run::messages::Silent;
+use scrnn_run::messages::{Messages, Silent};
 use scrnn_run::source;
 
 /// Networks that have learned nothing, beside three short demonstrations.
@@ -40,6 +40,33 @@ fn the_robot_learns_scaled_angles_by_the_settings_of_chapter_4() {
         let momentum = thesis.momentum.unwrap();
         assert_eq!((thesis.epochs, momentum.rate, momentum.momentum), (500_000, 1e-4, 0.9));
     }
+}
+
+/// Asks to stop when it hears these words.
+struct Stopping<'a>(&'a Interrupt, &'static str, std::sync::Mutex<Vec<String>>);
+
+impl Messages for Stopping<'_> {
+    fn say(&self, message: &str) {
+        self.2.lock().unwrap().push(message.to_owned());
+        if message.contains(self.1) {
+            self.0.ask();
+        }
+    }
+}
+
+#[test]
+fn the_fit_of_the_mixture_is_told_of_and_ends_when_somebody_asks() {
+    let networks = networks();
+    let engine = Engine::new(1, InstructionSet::best()).unwrap();
+    let interrupt = Interrupt::new();
+    let messages = Stopping(&interrupt, "a Gaussian mixture of 41 components", std::sync::Mutex::default());
+    let desk = Desk::new(&engine, (&interrupt, &messages), "seed 2", None);
+    let condition = REACH.conditions(false)[0];
+    let job = Job { condition: &condition, seed: 2, first: true, networks: &networks };
+    assert!(matches!(REACH.evaluate(&job, &desk), Err(crate::framework::stop::Stop::Interrupted)));
+    // It was the fit that ended: no performance was begun.
+    let said = messages.2.lock().unwrap();
+    assert_eq!(*said, ["seed 2: a Gaussian mixture of 41 components to compare with"]);
 }
 
 #[test]

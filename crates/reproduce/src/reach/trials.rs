@@ -85,7 +85,7 @@ pub struct Company<'a> {
 
 impl<'a> Company<'a> {
     /// Fits what the network is compared with.
-    pub fn new(networks: &'a [Learned], seed: u64, engine: &Engine) -> Result<Self> {
+    pub fn new(networks: &'a [Learned], seed: u64, desk: &Desk<'_>) -> Result<Self> {
         let demonstrations = &networks[0].source.demonstrations;
         let replays = (0..POSITIONS.len()).map(|position| mean_arms(demonstrations, position)).collect();
         let mut points = Vec::new();
@@ -96,8 +96,11 @@ impl<'a> Company<'a> {
             }
         }
         let options = MixtureOptions { components: COMPONENTS, seed, ..MixtureOptions::default() };
-        let mixture = GaussianMixture::fit(&points, 1 + REACHING.len(), &options)?;
-        Ok(Self { networks, engine: engine.clone(), replays, mixture })
+        desk.say(&format!("a Gaussian mixture of {COMPONENTS} components to compare with"));
+        let mut go_on =
+            |step| desk.at(|| format!("a Gaussian mixture, step {} of {} at most", step + 1, options.iterations));
+        let mixture = GaussianMixture::fit_while(&points, 1 + REACHING.len(), &options, &mut go_on)?;
+        Ok(Self { networks, engine: desk.engine().clone(), replays, mixture })
     }
 
     fn driver(&self, trial: &Trial) -> Result<Box<dyn Driver>> {

@@ -16,6 +16,9 @@ use rand::RngExt;
 use crate::error::{Error, Result};
 use crate::streams::{Purpose, stream};
 
+/// Points between two questions whether to go on.
+const BETWEEN_QUESTIONS: usize = 256;
+
 /// How to fit a mixture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MixtureOptions {
@@ -92,6 +95,39 @@ impl GaussianMixture {
     /// [`Error::Length`] if the values do not fill whole points or there are fewer points than components, and
     /// [`Error::Setting`] for values that are not finite, no components, or a regularisation that is not positive.
     pub fn fit(points: &[f64], dimensions: usize, options: &MixtureOptions) -> Result<Self> {
+        Self::fit_while(points, dimensions, options, &mut |_| Ok(()))
+    }
+
+    /// As [`GaussianMixture::fit`], as long as `go_on` is content. It is asked many times within a step, and given the number of steps that are
+    /// done; what it asks changes no bit.
+    ///
+    /// # Errors
+    /// As [`GaussianMixture::fit`], and those of `go_on`.
+    pub fn fit_while<E: From<Error>>(
+        points: &[f64],
+        dimensions: usize,
+        options: &MixtureOptions,
+        go_on: &mut dyn FnMut(usize) -> std::result::Result<(), E>,
+    ) -> std::result::Result<Self, E> {
+        let points = Self::points(points, dimensions, options)?;
+        let floor = floor(&points, options.regularisation);
+        let mut responsibilities = nearest_centres(&points, options, &mut || go_on(0))?;
+        let mut mixture = Self { components: Vec::new(), ln_density: f64::NEG_INFINITY, iterations: 0 };
+        while mixture.iterations < options.iterations.max(1) {
+            let done = mixture.iterations;
+            mixture.maximise(&points, &responsibilities, &floor, &mut || go_on(done))?;
+            let before = mixture.ln_density;
+            mixture.ln_density = mixture.expect(&points, &mut responsibilities, &mut || go_on(done))?;
+            mixture.iterations += 1;
+            if mixture.ln_density - before < options.tolerance {
+                break;
+            }
+        }
+        Ok(mixture)
+    }
+
+    /// The points of a request that can be met.
+    fn points(points: &[f64], dimensions: usize, options: &MixtureOptions) -> Result<Vec<DVector<f64>>> {
         let setting = |what, found: String, needed| Err(Error::Setting { what, found, needed });
         if options.components == 0 {
             return setting("the number of components", "0".into(), "at least 1");
@@ -111,19 +147,7 @@ impl GaussianMixture {
             let what = "the list of points".to_owned();
             return Err(Error::Length { what, found: points.len(), needed: options.components });
         }
-        let floor = floor(&points, options.regularisation);
-        let mut responsibilities = nearest_centres(&points, options);
-        let mut mixture = Self { components: Vec::new(), ln_density: f64::NEG_INFINITY, iterations: 0 };
-        while mixture.iterations < options.iterations.max(1) {
-            mixture.maximise(&points, &responsibilities, &floor);
-            mixture.iterations += 1;
-            let before = mixture.ln_density;
-            mixture.ln_density = mixture.expect(&points, &mut responsibilities);
-            if mixture.ln_density - before < options.tolerance {
-                break;
-            }
-        }
-        Ok(mixture)
+        Ok(points)
     }
 
     /// ln p(z) of a point.
@@ -174,10 +198,17 @@ impl GaussianMixture {
     }
 
     /// Weights, means and covariances that suit the responsibilities best.
-    fn maximise(&mut self, points: &[DVector<f64>], responsibilities: &DMatrix<f64>, floor: &DVector<f64>) {
+    fn maximise<E>(
+        &mut self,
+        points: &[DVector<f64>],
+        responsibilities: &DMatrix<f64>,
+        floor: &DVector<f64>,
+        go_on: &mut dyn FnMut() -> std::result::Result<(), E>,
+    ) -> std::result::Result<(), E> {
         let dimensions = floor.len();
         let before = std::mem::take(&mut self.components);
         for (k, shares) in responsibilities.column_iter().enumerate() {
+            go_on()?;
             let total = shares.sum();
             if total < 1e-9 * points.len() as f64
                 && let Some(component) = before.get(k).or(self.components.first())
@@ -198,13 +229,22 @@ impl GaussianMixture {
             }
             self.components.push(Component { weight: total / points.len() as f64, mean, covariance });
         }
+        Ok(())
     }
 
     /// The share of each component in each point; gives the mean of ln p.
-    fn expect(&self, points: &[DVector<f64>], responsibilities: &mut DMatrix<f64>) -> f64 {
+    fn expect<E>(
+        &self,
+        points: &[DVector<f64>],
+        responsibilities: &mut DMatrix<f64>,
+        go_on: &mut dyn FnMut() -> std::result::Result<(), E>,
+    ) -> std::result::Result<f64, E> {
         let factors: Vec<_> = self.components.iter().map(|component| factor(&component.covariance)).collect();
         let mut sum = 0.0;
         for (row, point) in points.iter().enumerate() {
+            if row % BETWEEN_QUESTIONS == 0 {
+                go_on()?;
+            }
             let terms: Vec<f64> = (self.components.iter().zip(&factors))
                 .map(|(component, factor)| component.weight.ln() + ln_normal(point, &component.mean, factor))
                 .collect();
@@ -214,7 +254,7 @@ impl GaussianMixture {
                 responsibilities[(row, k)] = (term - ln_density).exp();
             }
         }
-        sum / points.len() as f64
+        Ok(sum / points.len() as f64)
     }
 }
 
@@ -256,12 +296,17 @@ fn floor(points: &[DVector<f64>], regularisation: f64) -> DVector<f64> {
 
 /// One component for each point: that of the nearest of K centres, which are drawn with a probability that grows with the
 /// squared distance to those drawn before. Distances are in units of each dimension's deviation.
-fn nearest_centres(points: &[DVector<f64>], options: &MixtureOptions) -> DMatrix<f64> {
+fn nearest_centres<E>(
+    points: &[DVector<f64>],
+    options: &MixtureOptions,
+    go_on: &mut dyn FnMut() -> std::result::Result<(), E>,
+) -> std::result::Result<DMatrix<f64>, E> {
     let scale = floor(points, 1.0);
     let distance = |a: &DVector<f64>, b: &DVector<f64>| (a - b).map(|off| off * off).component_div(&scale).sum();
     let mut generator = stream(options.seed, Purpose::MixtureCentres, 0);
     let mut nearest = vec![(f64::INFINITY, 0); points.len()];
     for k in 0..options.components {
+        go_on()?;
         let total: f64 = nearest.iter().map(|(distance, _)| distance).sum();
         let mut left = generator.random::<f64>() * total;
         let drawn = match k {
@@ -282,7 +327,7 @@ fn nearest_centres(points: &[DVector<f64>], options: &MixtureOptions) -> DMatrix
             }
         }
     }
-    DMatrix::from_fn(points.len(), options.components, |row, k| f64::from(u8::from(nearest[row].1 == k)))
+    Ok(DMatrix::from_fn(points.len(), options.components, |row, k| f64::from(u8::from(nearest[row].1 == k))))
 }
 
 /// The factor of a covariance. The floor keeps it positive definite. If rounding still spoils that, the factor is that of its diagonal.
@@ -378,6 +423,36 @@ mod tests {
         let points: Vec<f64> = (0..300).map(|k| f64::from(k * k % 97)).collect();
         let fit = || GaussianMixture::fit(&points, 3, &MixtureOptions::default()).unwrap();
         assert_eq!(fit(), fit());
+    }
+
+    #[test]
+    fn a_fit_tells_its_steps_and_ends_where_it_is_told_to() {
+        let points: Vec<f64> = (0..3000).map(|k| f64::from(k * k % 97)).collect();
+        let options = MixtureOptions { iterations: 9, tolerance: 0.0, ..MixtureOptions::default() };
+        let mut told = Vec::new();
+        let watched = GaussianMixture::fit_while::<Error>(&points, 3, &options, &mut |step| {
+            told.push(step);
+            Ok(())
+        });
+        assert_eq!(watched.unwrap(), GaussianMixture::fit(&points, 3, &options).unwrap());
+        // For each component in turn, and for each few hundred of a thousand points; first for the centres.
+        assert!(
+            told.is_sorted() && (0..9).all(|step| told.iter().filter(|told| **told == step).count() >= 12),
+            "{told:?}"
+        );
+        #[derive(Debug, PartialEq)]
+        enum Ended {
+            Asked(usize),
+            Wrong(String),
+        }
+        impl From<Error> for Ended {
+            fn from(error: Error) -> Self {
+                Self::Wrong(error.to_string())
+            }
+        }
+        let mut ends = |step| if step == 3 { Err(Ended::Asked(step)) } else { Ok(()) };
+        assert_eq!(GaussianMixture::fit_while(&points, 3, &options, &mut ends), Err(Ended::Asked(3)));
+        assert!(matches!(GaussianMixture::fit_while(&points, 7, &options, &mut ends), Err(Ended::Wrong(_))));
     }
 
     #[test]
