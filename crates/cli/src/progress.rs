@@ -50,7 +50,8 @@ impl Bars {
 /// whenever nothing was said for two seconds.
 #[derive(Debug)]
 pub struct Busy {
-    what: Arc<Mutex<String>>,
+    /// What it is, and since when.
+    what: Arc<Mutex<(String, Instant)>>,
     bar: Option<ProgressBar>,
     /// Ends the thread of the lines when it is dropped.
     _lines: Option<Sender<()>>,
@@ -63,7 +64,8 @@ impl Busy {
     }
 
     fn beside(what: &str, quiet: bool, others: Option<&MultiProgress>) -> Self {
-        let what = Arc::new(Mutex::new(what.to_owned()));
+        let message = what.to_owned();
+        let what = Arc::new(Mutex::new((message.clone(), Instant::now())));
         if quiet {
             return Self { what, bar: None, _lines: None };
         }
@@ -75,15 +77,16 @@ impl Busy {
             .unwrap_or_else(|_| ProgressStyle::default_spinner());
         let bar = ProgressBar::new_spinner().with_style(style);
         let bar = others.map_or_else(|| bar.clone(), |others| others.add(bar.clone()));
-        bar.set_message(what.lock().unwrap_or_else(PoisonError::into_inner).clone());
+        bar.set_message(message);
         bar.enable_steady_tick(BETWEEN_UPDATES);
         Self { what, bar: Some(bar), _lines: None }
     }
 
-    /// It is at something else now.
+    /// It is at something else from now on.
     fn at(&self, what: &str) {
-        what.clone_into(&mut self.what.lock().unwrap_or_else(PoisonError::into_inner));
+        *self.what.lock().unwrap_or_else(PoisonError::into_inner) = (what.to_owned(), Instant::now());
         if let Some(bar) = &self.bar {
+            bar.reset_elapsed();
             bar.set_message(output::escaped(what).into_owned());
         }
     }
@@ -98,7 +101,7 @@ impl Drop for Busy {
 }
 
 /// Says what goes on, and for how long, whenever all else is silent. Without the thread nothing is said.
-fn lines(what: Arc<Mutex<String>>) -> Option<Sender<()>> {
+fn lines(what: Arc<Mutex<(String, Instant)>>) -> Option<Sender<()>> {
     let (until, over) = channel::<()>();
     let begun = Instant::now();
     let say = move || {
@@ -106,8 +109,8 @@ fn lines(what: Arc<Mutex<String>>) -> Option<Sender<()>> {
             let silent = output::silence().min(begun.elapsed());
             let left = BETWEEN_LINES.saturating_sub(silent);
             if left.is_zero() {
-                let what = what.lock().unwrap_or_else(PoisonError::into_inner).clone();
-                output::say(format_args!("{what}, {}", in_words(begun.elapsed())));
+                let (what, since) = what.lock().unwrap_or_else(PoisonError::into_inner).clone();
+                output::say(format_args!("{what}, {}", in_words(since.elapsed())));
             }
             match over.recv_timeout(left.max(BETWEEN_UPDATES)) {
                 Err(RecvTimeoutError::Timeout) => {}

@@ -180,6 +180,8 @@ impl<S: Study> Reproduction<'_, S> {
         let (findings, material) = study.evaluate(&job, &desk)?;
         desk.go_on()?;
         let films = study.films(&job, &desk)?;
+        // Others may still be at work: what is said of the time that passes is no longer about this one.
+        desk.say("evaluated");
         let evaluated = clock.elapsed().as_secs_f64() + desk.saved();
         let result = JobResult {
             condition: Some(condition.key).filter(|key| !key.is_empty()),
