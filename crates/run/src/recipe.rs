@@ -25,21 +25,18 @@ pub struct Recipe {
 
 /// Steps that a network of this recipe predicts ahead.
 const DELAY: usize = 1;
-/// Multiplications of a training of smooth movements, and of others: a minute or two of one core.
-const BUDGETS: (f64, f64) = (2e12, 1e12);
+/// Multiplications of a training: a minute or two of one core.
+const BUDGET: f64 = 1e12;
 /// Multiplications for each weight and step: forward, back, and the gradient.
 const WORK: f64 = 3.0;
 /// Sequences from which on they are learned in batches, and how many there are in a batch.
 const BATCHES: (usize, usize) = (20, 10);
-/// Updates that there are at least, and after which little more is gained: of smooth movements, and of others.
-const FEWEST: f64 = 300.0;
-const MOST: (f64, f64) = (12_000.0, 10_000.0);
+/// Updates after which little more is gained.
+const UPDATES: (f64, f64) = (300.0, 10_000.0);
 /// Epochs and updates after which a network learns the noise of its sequences by heart.
 const NOISY: (f64, f64) = (1000.0, 4000.0);
 /// What keeps it from that.
 const DECAY: f64 = 0.3;
-/// Share of smooth sequences that are taught throughout: where a loop is closed, nothing tells the network how far it errs one step ahead.
-const TAUGHT: f64 = 0.1;
 /// How long a movement that comes to rest is held there.
 const REST: f64 = 0.25;
 
@@ -55,7 +52,7 @@ pub(crate) fn leaves_open(reason: &Comment) -> bool {
 pub(crate) fn most_epochs(experiment: &Experiment, data: &Dataset) -> u64 {
     let units = experiment.network.groups.iter().map(|group| group.units).sum();
     let batch = experiment.training.adam.as_ref().map_or(0, |adam| adam.batch_size);
-    epochs(data.total_samples() as f64, units, data.channels().len(), updates(data, batch), (BUDGETS.1, MOST.1))
+    epochs(data.total_samples() as f64, units, data.channels().len(), updates(data, batch))
 }
 
 /// An experiment of defaults alone, to be filled in.
@@ -133,18 +130,17 @@ fn smooth(data: &Dataset, character: Character, reasons: &mut Reasons) -> (Optio
     network.groups = vec![Group::full("context", units, time_constant)];
     size_reasons(data, time_constant, reasons);
 
-    let closed_loop = ClosedLoop::with(|it| (it.weight, it.taught) = (1.0, TAUGHT));
+    let closed_loop = ClosedLoop::with(|it| (it.weight, it.taught) = (1.0, 0.0));
     // Taught throughout, or up to somewhere and then in copies.
     let passes = closed_loop.taught + (1.0 - closed_loop.taught) * (1.0 + closed_loop.copies as f64);
     let samples = data.total_samples() as f64 * (1.0 + rest.unwrap_or(0.0));
     let batch = batch(data, reasons);
-    let limits = (BUDGETS.0, MOST.0);
-    training.epochs = epochs(samples * passes, units, 2 * data.channels().len(), updates(data, batch), limits);
+    training.epochs = epochs(samples * passes, units, 2 * data.channels().len(), updates(data, batch));
     reasons.add("training.epochs", "A minute or two of one core at most.");
     reasons.add("training.optimiser", "Learns sooner than the thesis' rule.");
     reasons.add(
         "training.closed_loop.copies",
-        "Nine of ten sequences are learned in the closed loop, so that the network can go on from its own predictions, and knows how far \
+        "All sequences are learned in the closed loop, so that the network can go on from its own predictions, and knows how far \
          they can be trusted.",
     );
     training.closed_loop = Some(closed_loop);
@@ -179,8 +175,7 @@ fn noisy(data: &Dataset, character: Character, reasons: &mut Reasons) -> (Option
     let batch = batch(data, reasons);
     let updates = updates(data, batch);
     let most = rounded(NOISY.0.min((NOISY.1 / updates as f64).max(1.0)));
-    let limits = (BUDGETS.1, MOST.1);
-    training.epochs = epochs(data.total_samples() as f64, units, data.channels().len(), updates, limits).min(most);
+    training.epochs = epochs(data.total_samples() as f64, units, data.channels().len(), updates).min(most);
     reasons.add("training.epochs", UNTRIED);
     reasons.add("training.optimiser", "Learns sooner than the thesis' rule.");
     reasons.add("training.adam.weight_decay", "Keeps the network from learning single samples by heart.");
@@ -226,10 +221,10 @@ fn updates(data: &Dataset, batch: usize) -> usize {
 }
 
 /// Epochs that the budget allows, of so many steps each, and no more updates than do any good.
-fn epochs(steps: f64, units: usize, inputs: usize, updates: usize, (budget, most): (f64, f64)) -> u64 {
+fn epochs(steps: f64, units: usize, inputs: usize, updates: usize) -> u64 {
     let work = steps * ((units * units + 3 * units * inputs) as f64) * WORK;
     let few = |count: f64| (count / updates as f64).max(1.0);
-    rounded((budget / work).clamp(few(FEWEST), few(most)))
+    rounded((BUDGET / work).clamp(few(UPDATES.0), few(UPDATES.1)))
 }
 
 /// Context units: more for more to tell apart, fewer where there is little to learn from.
@@ -313,7 +308,7 @@ mod tests {
         let small = choose(&waves(24.0, 1, 60));
         let large = choose(&waves(24.0, 30, 2000));
         let of = |recipe: &Recipe| (recipe.network.groups[0].units, recipe.training.epochs);
-        assert_eq!(of(&small), (11, 12_000));
+        assert_eq!(of(&small), (11, 10_000));
         assert!(of(&large).0 > 30 && of(&large).1 < 2000, "{:?}", of(&large));
         let batch = |recipe: &Recipe| recipe.training.adam.as_ref().unwrap().batch_size;
         assert_eq!((batch(&small), batch(&large)), (0, 10));
