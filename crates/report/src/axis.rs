@@ -68,7 +68,10 @@ impl Axis {
 /// A number on an axis whose numbers are so far apart.
 fn shown(value: f64, step: f64) -> String {
     if value != 0.0 && !(1e-3..1e6).contains(&step) {
-        return format!("{value:.0e}");
+        // 2.2e-3 and 2.6e-3, not 2e-3 and 3e-3.
+        let place = |value: f64| (value.abs().log10() + 1e-9).floor();
+        let digits = (place(value) - place(step)).clamp(0.0, 6.0) as usize;
+        return format!("{value:.digits$e}");
     }
     let digits = (-step.log10() - 1e-9).ceil().clamp(0.0, 6.0) as usize;
     let text = format!("{value:.digits$}");
@@ -89,8 +92,12 @@ mod tests {
             shown(500.0, 100.0),
             shown(0.01, 0.01),
             shown(1.0, 0.5),
+            shown(2.2e-3, 2e-4),
+            shown(-2.5e-3, 5e-4),
+            shown(1e-3, 1e-3),
+            shown(3e7, 1e6),
         ];
-        assert_eq!(all, ["5e-4", "0.25", "0", "500", "0.01", "1.0"]);
+        assert_eq!(all, ["5e-4", "0.25", "0", "500", "0.01", "1.0", "2.2e-3", "-2.5e-3", "0.001", "3.0e7"]);
     }
 
     #[test]
