@@ -135,7 +135,7 @@ def main():
     peers = [Peer(name, script, threads) for name, script in scripts for threads in (1, 0)]
     python()
     prepare(built("build", "--release", "-p", "scrnn-cli"))
-    bench = built("bench", "-p", "scrnn", "--bench", "share_of_peak", "--no-run")
+    bench = built("bench", "-p", "scrnn-checks", "--bench", "share_of_peak", "--no-run")
     for peer in peers:
         peer.choose()
 
