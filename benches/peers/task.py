@@ -38,13 +38,17 @@ def arguments(description):
     return given
 
 
+def learned(folder):
+    """The sequences of the archive, in their order; it holds their names, too."""
+    with np.load(folder / "lissajous.npz") as archive:
+        return [archive[name] for name in sorted(archive.files) if name.startswith("sequence_")]
+
+
 def load(folder):
     """Parameters with the initial states, samples [T + 1, S, I], and time constants."""
     tensors = load_file(folder / "before" / "checkpoint.safetensors")
     parameters = {name: tensors[name] for name in [*BLOCKS, "initial_state"]}
-    with np.load(folder / "lissajous.npz") as archive:
-        samples = np.stack([archive[name] for name in sorted(archive.files)], axis=1)
-    return parameters, samples, tensors["time_constant"]
+    return parameters, np.stack(learned(folder), axis=1), tensors["time_constant"]
 
 
 def difference(folder, ln_likelihood, gradients):
@@ -58,9 +62,8 @@ def difference(folder, ln_likelihood, gradients):
         at += before[name].size
     with open(folder / "before" / "history.csv", newline="") as file:
         nll = float(list(csv.DictReader(file))[-1]["nll"])
-    with np.load(folder / "lissajous.npz") as archive:
-        terms = sum(archive[name][1:].size for name in archive.files)
-    worst = abs(-ln_likelihood / terms / nll - 1.0)
+    terms = sum(sequence[1:].size for sequence in learned(folder))
+    worst = abs(-float(ln_likelihood) / terms / nll - 1.0)
     for name, value in ours.items():
         worst = max(worst, float(np.abs(np.asarray(gradients[name]) - value).max() / np.abs(value).max()))
     return worst
