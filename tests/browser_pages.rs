@@ -376,12 +376,6 @@ fn a_sweep_and_a_mixture_are_watched_until_all_are_done() {
     // Its own server would go with it: another one reads the same folder.
     let (sweeping, own) = served(folder.path(), "sweep two.toml --out two --watch");
     refuses_other_hosts(&own, "data/0.json", "seed-1");
-    // The page is there before the plan is: a reader of the folder needs the plan.
-    let begun = std::time::Instant::now();
-    while !folder.path().join("two/plan.json").exists() {
-        assert!(begun.elapsed().as_secs() < 60, "no plan");
-        std::thread::sleep(std::time::Duration::from_millis(20));
-    }
     let (_status, url) = served(folder.path(), "sweep two.toml --out two --status --watch");
     let Some(found) = used(folder.path(), &["many", &url]) else { return };
     sweeping.ends();

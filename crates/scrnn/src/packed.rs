@@ -48,8 +48,6 @@ pub(crate) struct Packed<E: Element = f64> {
     pub backward: Panels<E>,
     /// The output rows alone, for loops that need the prediction before the next input.
     pub outputs: Panels<E>,
-    /// The input does not reach the outputs: zeros, so that both products have one form.
-    pub outputs_from_input: Panels<E>,
     pub output_bias: AVec<E>,
     /// Back from the context to the input. Rows: inputs.
     pub to_input: Panels<E>,
@@ -94,7 +92,6 @@ impl<E: Element> Packed<E> {
             rate,
             backward: panels(n_c, n_c + n_out),
             outputs: panels(n_out, n_c),
-            outputs_from_input: panels(n_out, n_x),
             output_bias: filled(E::padded(n_out), E::ZERO),
             to_input: panels(n_x, n_c),
             floor: topology.variance_floor(),

@@ -78,26 +78,15 @@ impl Stepper {
     #[inline(always)]
     pub fn step<S: Simd>(&mut self, simd: S, packed: &Packed) {
         let (rows, stride, columns) = (packed.rows, packed.state_stride, self.columns);
+        let sources = [Columns { values: &self.states[rows..], stride }, Columns { values: &self.states, stride }];
         let matrices = [&packed.from_input, &packed.from_context];
-        let product = Product {
-            matrices,
-            sources: sources(&self.states, rows, stride),
-            columns,
-            start: &packed.bias,
-            ahead: &[],
-        };
+        let product = Product { matrices, sources, columns, start: &packed.bias, ahead: &[] };
         let way = Way { end: End::Keep(&packed.decay), ..Way::default() };
         multiply_into(simd, product, way, &mut self.internal);
         activate(simd, packed, &self.internal, &mut self.states, columns);
 
-        let matrices = [&packed.outputs_from_input, &packed.outputs];
-        let product = Product {
-            matrices,
-            sources: sources(&self.states, packed.rows, stride),
-            columns,
-            start: &packed.output_bias,
-            ahead: &[],
-        };
+        let sources = [Columns { values: &self.states, stride }];
+        let product = Product { matrices: [&packed.outputs], sources, columns, start: &packed.output_bias, ahead: &[] };
         multiply(simd, product, &mut self.outputs);
         let outputs = padded(packed.n_out);
         for (u, y) in self.outputs.chunks_exact(outputs).zip(self.mean.chunks_exact_mut(outputs)) {
@@ -109,10 +98,4 @@ impl Stepper {
             *v = exp(simd, *u);
         }
     }
-}
-
-/// The inputs and the contexts of all columns.
-#[inline(always)]
-fn sources(states: &[f64], rows: usize, stride: usize) -> [Columns<'_>; 2] {
-    [Columns { values: &states[rows..], stride }, Columns { values: states, stride }]
 }

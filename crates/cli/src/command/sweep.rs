@@ -122,6 +122,10 @@ pub fn run(arguments: &Arguments, (shared, signals): (&Shared, &Signals)) -> Res
         retry: arguments.retry,
         wait: !arguments.no_wait,
     };
+    if arguments.watch.is_some() {
+        // Whoever is told of the page may look into the folder, too.
+        working::prepare(&plan, &folder, shared)?;
+    }
     let _page = page(arguments.watch, &folder, Some(&plan))?;
     let worked = working::work(&plan, &folder, &options, &context)?;
     if arguments.json {

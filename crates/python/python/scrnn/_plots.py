@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-
 def axes(ax: Axes | None) -> Axes:
     """The axes that were handed in, or new ones."""
     if ax is not None:
