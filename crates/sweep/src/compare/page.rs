@@ -51,8 +51,10 @@ pub fn page(collected: &Collected, best: Option<&Best>, networks: usize) -> Page
             sections.push(Section { title: title.to_owned(), blocks });
         }
     };
-    push("Which setting is best", verdict(collected, best));
-    push("Measures", shown.iter().filter_map(|measure| figure_of(collected, measure)).collect());
+    // First the picture that answers the question, then the answer.
+    let mut figures = shown.iter().filter_map(|measure| figure_of(collected, measure));
+    push("Which setting is best", figures.next().into_iter().chain(verdict(collected, best)).collect());
+    push("Other measures", figures.collect());
     push("Settings", sheet_of_settings(collected, &order));
     push(
         "Differences between settings",
