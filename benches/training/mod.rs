@@ -27,6 +27,7 @@ pub fn waves(topology: &Topology, sequences: usize, steps: usize) -> Dataset {
 pub struct Training {
     /// The learner, made but not run.
     pub learner: Learner,
+    engine: Engine,
 }
 
 impl Training {
@@ -52,14 +53,15 @@ impl Training {
         });
         let engine = Engine::new(threads, set).expect("an instruction set that this processor has");
         let learner = Learner::new(network, states, data, plan, &engine).expect("data made for the network");
-        Self { learner }
+        Self { learner, engine }
     }
 
     /// The time of `epochs` epochs, each an update and the evaluation after it. What comes before the first and after
     /// the last is left out.
     pub fn time(&mut self, epochs: u64) -> Duration {
         let (mut seen, mut start, mut elapsed) = (0, Instant::now(), Duration::ZERO);
-        let _ = self.learner.run(&mut |_: &EpochReport, _: &Learner| {
+        let Self { learner, engine } = self;
+        let mut watch = |_: &EpochReport, _: &Learner| {
             if seen == 0 {
                 start = Instant::now();
             } else if seen == epochs {
@@ -68,7 +70,9 @@ impl Training {
             }
             seen += 1;
             ControlFlow::Continue(())
-        });
+        };
+        // As a training runs in the program.
+        let _ = engine.enter(|| learner.run(&mut watch));
         assert!(seen == epochs, "the training ended after {seen} of {epochs} epochs");
         elapsed
     }

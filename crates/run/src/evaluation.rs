@@ -283,7 +283,8 @@ impl Bench {
                     it.polish = 100;
                     it.initial_state_variance = search.initial_state_variance;
                 });
-                let mut found = recognize(member.network, member.states, &data, &options, &self.engine)?;
+                let search = || recognize(member.network, member.states, &data, &options, &self.engine);
+                let mut found = self.engine.enter(search)?;
                 Ok(found.swap_remove(0).trials.swap_remove(0).initial_state)
             });
             states.collect::<Result<Vec<_>>>()

@@ -12,8 +12,8 @@ pub trait Messages: Sync {
     fn say(&self, message: &str);
 }
 
-/// Watches one training.
-pub trait Progress: fmt::Debug {
+/// Watches one training, from whichever thread it runs on.
+pub trait Progress: fmt::Debug + Send {
     /// An epoch is over.
     fn epoch(&mut self, report: &EpochReport);
 

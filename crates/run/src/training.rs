@@ -176,7 +176,7 @@ pub fn train_on(
     } else {
         recorder.save(&learner)?;
     }
-    let outcome = learner.run(&mut recorder);
+    let outcome = engine.enter(|| learner.run(&mut recorder));
     recorder.finish(&learner, &outcome)?;
     let (score, best, seconds) = (recorder.score_of(learner.epoch()), recorder.best(), recorder.seconds());
     let (best_network, out_of_patience) = (recorder.best_network(&learner)?, recorder.out_of_patience());

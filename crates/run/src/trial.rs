@@ -120,7 +120,7 @@ impl Trial {
             progress.trying("how long to learn", report.epoch, epochs);
             if interrupt.asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
-        match learner.run(&mut watch) {
+        match engine.enter(|| learner.run(&mut watch)) {
             Outcome::Stopped => return Ok(None),
             Outcome::Diverged(_) => return Ok(Some(f64::INFINITY)),
             Outcome::Finished => {}

@@ -184,6 +184,17 @@ impl Engine {
         return 1;
     }
 
+    /// Runs `work` on one of the threads, and what it shares out later is shared out from there. A training should be run so: a caller
+    /// that stays outside sleeps while each evaluation wakes the threads anew, and is asked to wait for them each time. No bit
+    /// depends on it.
+    pub fn enter<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
+        #[cfg(feature = "rayon")]
+        if let Some(pool) = &self.pool {
+            return pool.install(work);
+        }
+        work()
+    }
+
     /// Calls `work` on every item, on any thread. Each item must carry its own result.
     pub(crate) fn for_each<T: Send>(&self, items: &mut [T], work: impl Fn(&mut T) + Sync + Send) {
         #[cfg(feature = "rayon")]
@@ -216,6 +227,26 @@ mod tests {
         let mut found = vec![None; 50];
         engine.for_each(&mut found, |index| *index = pool.current_thread_index());
         assert!(found.iter().all(|index| index.is_some_and(|index| index < 3)), "{found:?}");
+    }
+
+    #[cfg(feature = "rayon")]
+    #[test]
+    fn whoever_has_entered_is_one_of_the_threads() {
+        use std::collections::HashSet;
+        use std::thread::{ThreadId, current};
+
+        let engine = Engine::new(3, InstructionSet::best()).unwrap();
+        let outside = current().id();
+        let (inside, met) = engine.enter(|| {
+            let mut met: Vec<Option<ThreadId>> = vec![None; 60];
+            engine.for_each(&mut met, |id| *id = Some(current().id()));
+            (current().id(), met)
+        });
+        let ids: HashSet<ThreadId> = met.into_iter().flatten().collect();
+        assert!(inside != outside && !ids.contains(&outside) && ids.len() <= 3, "{ids:?}");
+        // Once more from within, and where there is but one thread.
+        assert_eq!(engine.enter(|| engine.enter(|| 7)), 7);
+        assert_eq!(Engine::serial().enter(|| current().id()), outside);
     }
 
     #[test]
