@@ -66,12 +66,17 @@ pub fn accumulate<S: Simd, E: Element>(
 ) {
     debug_assert!(rows.is_multiple_of(E::ROWS) && gradient.len() >= (to - from) * rows);
     let taken = taken.into();
-    let is_tall = tallest::<S>() * lanes::<S, E>() > E::ROWS;
-    let block = if is_tall && to - from >= MANY { BLOCK } else { to - from };
+    let block = if is_tall::<S, E>() && to - from >= MANY { BLOCK } else { to - from };
     for first in (from..to).step_by(block.max(1)) {
-        let job = Job { delta, state, taken, rows, row: 0, from: first, to: to.min(first + block) };
+        let is_part = block < to - from;
+        let job = Job { delta, state, taken, rows, row: 0, from: first, to: to.min(first + block), is_part };
         bands(simd, job, &mut gradient[(first - from) * rows..]);
     }
+}
+
+/// Whether a band is taller than the rows that any tile has: then there are few of them, and k are taken in blocks.
+const fn is_tall<S: Simd, E: Element>() -> bool {
+    tallest::<S>() * lanes::<S, E>() > E::ROWS
 }
 
 #[inline(always)]
@@ -102,6 +107,8 @@ struct Job<'a, E> {
     row: usize,
     from: usize,
     to: usize,
+    /// Whether the k are a block of many, and so the gradient is far away.
+    is_part: bool,
 }
 
 #[inline(always)]
@@ -161,6 +168,16 @@ impl<E: Element, const M: usize, const N: usize> WithSimd for Tile<'_, E, M, N> 
         }
         let (height, k) = (M * lanes, job.from + first);
         let Taken { groups, width, period } = job.taken;
+        // Where the next tile begins: below this one, at the top of the next band, or in the next block. A vector is a line here.
+        let (below, right, count) = (first + N, job.row + height, job.to - job.from);
+        let (next_k, next_row) = match (below < count, right < job.rows) {
+            (true, _) => (below, job.row),
+            (false, true) => (0, right),
+            (false, false) => (count, 0),
+        };
+        let next = gradient.as_ptr().wrapping_add(next_k * job.rows + next_row);
+        let lines = if is_tall::<S, E>() && job.is_part { M * N } else { 0 };
+        let mut fetched = 0;
         let is_far = groups * width * height * size_of::<E>() > NEAR;
         for group in 0..groups {
             let first = group * period;
@@ -172,6 +189,10 @@ impl<E: Element, const M: usize, const N: usize> WithSimd for Tile<'_, E, M, N> 
                         fetch(simd, delta.as_ptr().wrapping_add(AHEAD * job.delta.stride + line * E::ROWS));
                     }
                     fetch(simd, state.as_ptr().wrapping_add(AHEAD * job.state.stride));
+                }
+                if fetched < lines {
+                    fetch(simd, next.wrapping_add(fetched / M * job.rows + fetched % M * lanes));
+                    fetched += 1;
                 }
                 let delta = E::vectors::<S>(&delta[..height]);
                 let state = &state[..N];
