@@ -53,17 +53,19 @@ def read(path, field):
     return [held[name] for name in sorted(names, key=lambda name: int(name.rsplit("_", 1)[1]))]
 
 
-def trained(task, seed, quick):
+def trained(task, seed, quick, members=1):
     """The run of a task and a seed, and its processor time."""
-    at = RUNS / ("quick" if quick else "full") / f"{task.name}.{seed}"
+    mixed = f".{members}-mixed" if members > 1 else ""
+    at = RUNS / ("quick" if quick else "full") / f"{task.name}.{seed}{mixed}"
     kept = at / "seconds.json"
     if not kept.exists():
         shutil.rmtree(at, ignore_errors=True)
         at.mkdir(parents=True)
         write(at / "learned.npz", task.part(task.learned)[0])
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        shorter = ("--set", "training.epochs=100") if quick else ()
-        scrnn("train", at / "learned.npz", *AXES, "--out", at / "run", "--seed", seed, *shorter)
+        told = [("training.epochs", 100)] * quick + [("training.members", members)] * (members > 1)
+        settings = [part for key, value in told for part in ("--set", f"{key}={value}")]
+        scrnn("train", at / "learned.npz", *AXES, "--out", at / "run", "--seed", seed, *settings)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         kept.write_text(json.dumps(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime))
     return at / "run", json.loads(kept.read_text())
@@ -73,12 +75,13 @@ class Scrnn(Method):
     """One network for all labels, told neither label nor length. Runs are kept beside the results, and not trained again."""
 
     copies_ahead = 10
+    members = 1
 
     def fit(self, task, seed, quick):
         self.task, self.seed = task, seed
         self.folder = tempfile.TemporaryDirectory(prefix="rivals-")
         self.at = pathlib.Path(self.folder.name)
-        self.run, self.seconds = trained(task, seed, quick)
+        self.run, self.seconds = trained(task, seed, quick, self.members)
 
     def generate(self, name, sequences, *arguments):
         """Means, variances and samples; the network hears the sequences, then itself."""
@@ -139,16 +142,7 @@ class Scrnn(Method):
 
 
 class ScrnnMembers(Scrnn):
-    """A mixture of four networks, as `training.members = 4` makes it: of this seed and the three after it."""
+    """A mixture of four networks, as `--set training.members=4` makes it: of this seed and the three after it."""
 
     seeds = (1,)
     members = 4
-
-    def fit(self, task, seed, quick):
-        super().fit(task, seed, quick)
-        self.run, self.seconds = self.at / "mixture", 0.0
-        self.run.mkdir()
-        for k in range(self.members):
-            run, seconds = trained(task, seed + k, quick)
-            shutil.copytree(run, self.run / f"member-{k + 1}")
-            self.seconds += seconds

@@ -31,7 +31,7 @@ const BUDGET: f64 = 1e12;
 const WORK: f64 = 3.0;
 /// Sequences from which on they are learned in batches, and how many there are in a batch.
 const BATCHES: (usize, usize) = (20, 10);
-/// Updates after which little more is gained.
+/// Updates after which a single network gains little more.
 const UPDATES: (f64, f64) = (300.0, 10_000.0);
 /// Epochs and updates after which a network learns the noise of its sequences by heart.
 const NOISY: (f64, f64) = (1000.0, 4000.0);
@@ -39,6 +39,9 @@ const NOISY: (f64, f64) = (1000.0, 4000.0);
 const DECAY: f64 = 0.3;
 /// How long a movement that comes to rest is held there.
 const REST: f64 = 0.25;
+/// How much longer each network of a mixture learns smooth movements, and the share of its sequences that are taught throughout. One that
+/// learned for so long may be too sure of which movement it is; where that is not known, the networks of a mixture disagree.
+const MIXED: (f64, f64) = (2.0, 0.1);
 
 /// Why noisy data are not learned for longer, until that was tried.
 const UNTRIED: &str = "After more the network knows single samples by heart, and does worse on new ones.";
@@ -71,9 +74,10 @@ impl Reasons {
     }
 }
 
-/// Chooses settings by what kind of movement the data are, by how fast they change, and by how much there is of them.
+/// Chooses settings by what kind of movement the data are, by how fast they change, by how much there is of them, and by how many networks
+/// learn them side by side.
 #[must_use]
-pub fn choose(data: &Dataset) -> Recipe {
+pub fn choose(data: &Dataset, members: u64) -> Recipe {
     let mut reasons = Reasons::default();
     let spikes = look(data).iter().any(|one| matches!(one, Suspicion::Spikes { .. }));
     let scaling = if spikes { ScalingName::Robust } else { ScalingName::Fit };
@@ -87,14 +91,19 @@ pub fn choose(data: &Dataset) -> Recipe {
     reasons.add("network.delay", "The next sample is predicted from this one.");
     let character = Character::of(data);
     let (rest, network, training) = match character.is_smooth() {
-        true => smooth(data, character, &mut reasons),
+        true => smooth(data, character, members > 1, &mut reasons),
         false => noisy(data, character, &mut reasons),
     };
     Recipe { scaling, rest, network, training, reasons: reasons.0 }
 }
 
 /// Smooth movements: what a straight line does not predict, in a closed loop as well as one step ahead.
-fn smooth(data: &Dataset, character: Character, reasons: &mut Reasons) -> (Option<f64>, Network, Training) {
+fn smooth(
+    data: &Dataset,
+    character: Character,
+    mixed: bool,
+    reasons: &mut Reasons,
+) -> (Option<f64>, Network, Training) {
     let Experiment { mut network, mut training, .. } = bare();
     let rest = character.rests.then_some(REST);
     if rest.is_some() {
@@ -130,18 +139,35 @@ fn smooth(data: &Dataset, character: Character, reasons: &mut Reasons) -> (Optio
     network.groups = vec![Group::full("context", units, time_constant)];
     size_reasons(data, time_constant, reasons);
 
-    let closed_loop = ClosedLoop::with(|it| (it.weight, it.taught) = (1.0, 0.0));
-    // Taught throughout, or up to somewhere and then in copies.
-    let passes = closed_loop.taught + (1.0 - closed_loop.taught) * (1.0 + closed_loop.copies as f64);
+    let (longer, taught) = if mixed { MIXED } else { (1.0, 0.0) };
+    let closed_loop = ClosedLoop::with(|it| (it.weight, it.taught) = (1.0, taught));
+    // Up to somewhere, and then in copies; the few that are taught cost less.
+    let passes = 1.0 + closed_loop.copies as f64;
     let samples = data.total_samples() as f64 * (1.0 + rest.unwrap_or(0.0));
     let batch = batch(data, reasons);
-    training.epochs = epochs(samples * passes, units, 2 * data.channels().len(), updates(data, batch));
-    reasons.add("training.epochs", "A minute or two of one core at most.");
+    let epochs = epochs(samples * passes, units, 2 * data.channels().len(), updates(data, batch));
+    training.epochs = rounded(longer * epochs as f64);
+    reasons.add("training.epochs", match mixed {
+        true => {
+            "Some minutes of one core for each network. A single one learns half as long: after that it may be too sure of which movement \
+             it is. In a mixture the networks disagree where that is not known."
+        }
+        false => {
+            "A minute or two of one core. `members = 4` mixes four networks, each of which learns twice as long: its closed loops \
+             come nearer, and know better how far they can be trusted."
+        }
+    });
     reasons.add("training.optimiser", "Learns sooner than the thesis' rule.");
     reasons.add(
         "training.closed_loop.copies",
-        "All sequences are learned in the closed loop, so that the network can go on from its own predictions, and knows how far \
-         they can be trusted.",
+        "The network learns in the closed loop, so that it can go on from its own predictions, and knows how far they can be trusted.",
+    );
+    reasons.add(
+        "training.closed_loop.taught",
+        match mixed {
+            true => "A tenth of the sequences of an epoch is taught step by step instead, which is better for the next step.",
+            false => "No sequence is taught step by step to its end.",
+        },
     );
     training.closed_loop = Some(closed_loop);
     training.adam = Some(Adam::with(|it| it.batch_size = batch));
@@ -305,8 +331,8 @@ mod tests {
 
     #[test]
     fn more_to_tell_apart_takes_more_units_and_more_work_fewer_epochs() {
-        let small = choose(&waves(24.0, 1, 60));
-        let large = choose(&waves(24.0, 30, 2000));
+        let small = choose(&waves(24.0, 1, 60), 1);
+        let large = choose(&waves(24.0, 30, 2000), 1);
         let of = |recipe: &Recipe| (recipe.network.groups[0].units, recipe.training.epochs);
         assert_eq!(of(&small), (11, 10_000));
         assert!(of(&large).0 > 30 && of(&large).1 < 2000, "{:?}", of(&large));
@@ -315,15 +341,25 @@ mod tests {
     }
 
     #[test]
+    fn networks_of_a_mixture_learn_smooth_movements_for_longer() {
+        let data = waves(200.0, 20, 400);
+        let [one, four] = [1, 4].map(|members| choose(&data, members).training);
+        let taught = |training: &Training| training.closed_loop.as_ref().unwrap().taught;
+        assert_eq!((taught(&one), taught(&four)), (0.0, 0.1));
+        let ratio = four.epochs as f64 / one.epochs as f64;
+        assert!((1.9..2.1).contains(&ratio), "{ratio}");
+    }
+
+    #[test]
     fn what_stands_still_gets_a_floor_and_what_has_spikes_is_scaled_without_them() {
         let still = Dataset::new(vec!["y".into()], vec![Sequence::new("", 1, vec![1.0; 9]).unwrap()]).unwrap();
-        assert_eq!(choose(&still).network.variance_floor, 1e-4);
+        assert_eq!(choose(&still, 1).network.variance_floor, 1e-4);
         let wave = waves(24.0, 1, 500);
-        assert_eq!(choose(&wave).scaling, ScalingName::Fit);
+        assert_eq!(choose(&wave, 1).scaling, ScalingName::Fit);
         let mut values = wave.sequences()[0].values().to_vec();
         values[100] = 50.0;
         let spiked = Dataset::new(vec!["y".into()], vec![Sequence::new("", 1, values).unwrap()]).unwrap();
-        assert_eq!(choose(&spiked).scaling, ScalingName::Robust);
+        assert_eq!(choose(&spiked, 1).scaling, ScalingName::Robust);
     }
 
     #[test]
@@ -332,7 +368,7 @@ mod tests {
             let noise = |k: usize| ((k * k * 7919) % 1009) as f64 / 504.5 - 1.0;
             let values = |s: usize| (0..100).map(|k| noise(k + 101 * s)).collect();
             let one = |s: usize| Sequence::new(s.to_string(), 1, values(s)).unwrap();
-            choose(&Dataset::new(vec!["y".into()], (0..sequences).map(one).collect()).unwrap())
+            choose(&Dataset::new(vec!["y".into()], (0..sequences).map(one).collect()).unwrap(), 1)
         };
         for (sequences, epochs) in [(3, 1000), (40, 1000), (100, 400), (2000, 20)] {
             let Recipe { network, training, .. } = noisy(sequences);

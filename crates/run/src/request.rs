@@ -198,7 +198,8 @@ fn alone(files: &[PathBuf], overrides: &[Override], out: Option<&Path>, resume: 
     let files = Data { files: Some(files.to_vec()), ..Data::default() };
     let first = Experiment { name, data: files, ..recipe::bare() };
     let first = experiment::read_text("the experiment", &first.to_file(), &of_data(overrides))?;
-    let (chosen, source, reasons) = choose(first, (Path::new(""), None))?;
+    let members = members_asked(&toml::Table::new(), overrides);
+    let (chosen, source, reasons) = choose(first, members, (Path::new(""), None))?;
     let mut experiment =
         experiment::read_text("the experiment", &chosen.to_file(), overrides)?.resolved(Path::new(""))?;
     experiment.comments = told_from(reasons, overrides);
@@ -225,12 +226,19 @@ fn of_data(overrides: &[Override]) -> Vec<Override> {
 /// Where the data of an experiment are: in files, whose paths start from this folder, or at hand.
 type Place<'a> = (&'a Path, Option<Dataset>);
 
-/// Reads the data of an experiment that says no more than that, and puts in what the recipe chooses for them, with its reasons. It chooses
-/// by what is learned; what is held out has no say.
-fn choose(first: Experiment, (folder, at_hand): Place<'_>) -> Result<(Experiment, Source, Vec<Comment>)> {
+/// How many networks are asked for: `training.members`, on the command line or in an experiment file.
+fn members_asked(given: &toml::Table, overrides: &[Override]) -> u64 {
+    let typed = overrides.iter().rev().find(|change| change.path == ["training", "members"]);
+    let value = typed.map(|change| &change.value).or_else(|| given.get("training")?.get("members"));
+    value.and_then(toml::Value::as_integer).and_then(|members| u64::try_from(members).ok()).unwrap_or(1)
+}
+
+/// Reads the data of an experiment that says no more than that, and puts in what the recipe chooses for so many networks of them, with its
+/// reasons. It chooses by what is learned; what is held out has no say.
+fn choose(first: Experiment, members: u64, (folder, at_hand): Place<'_>) -> Result<(Experiment, Source, Vec<Comment>)> {
     let mut source = source_of(&first.clone().resolved(folder)?.data, at_hand)?;
     let Recipe { scaling, rest, network, training, reasons } =
-        recipe::choose(&held_out::learned(&source.data, &first)?);
+        recipe::choose(&held_out::learned(&source.data, &first)?, members);
     if let (None, Some(rest)) = (first.data.rest, rest) {
         source.data = source::at_rest(&source.data, rest)?;
     }
@@ -286,7 +294,7 @@ fn by_recipe(
         let message = "`training.recipe` chooses settings for data from files, and these are a task of the thesis";
         return Err(Failure::input(message, "leave recipe out: assets/experiments has settings for the tasks"));
     }
-    let (chosen, source, reasons) = choose(first, (folder, at_hand))?;
+    let (chosen, source, reasons) = choose(first, members_asked(&given, overrides), (folder, at_hand))?;
     let mut whole = toml::Table::try_from(&chosen).expect("an experiment is a table");
     let mut own = given;
     if let Some(training) = own.get_mut("training").and_then(toml::Value::as_table_mut) {
@@ -399,6 +407,12 @@ mod tests {
         assert_eq!((own.network.skip, own.training.epochs), (SkipName::Residual, 7));
         assert_eq!(own.network.groups, chosen.network.groups);
         assert!(!own.comments.iter().any(|comment| comment.key == "network.skip"));
+        let mixed = asked(&format!("{data}[training]\nrecipe = \"auto\"\nmembers = 4\n")).unwrap().experiment;
+        assert_eq!(mixed.training.closed_loop.as_ref().unwrap().taught, 0.1);
+        let typed = Request::of(&[folder.path().join("mine.csv")], false).unwrap();
+        let typed = typed.experiment(&["training.members=4".parse().unwrap()], None, false).unwrap().experiment;
+        assert_eq!((typed.training.epochs, typed.training.members), (mixed.training.epochs, Some(4)));
+        assert!(typed.training.epochs > chosen.training.epochs);
         let task = asked("name = \"s\"\n[data]\ntask = \"sinusoid\"\n[training]\nrecipe = \"auto\"\n");
         assert!(task.unwrap_err().to_string().contains("a task of the thesis"));
     }
