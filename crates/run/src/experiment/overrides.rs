@@ -96,6 +96,15 @@ impl Override {
     }
 }
 
+/// What is no TOML: a number as people type it, `.1` or `1.`, or text.
+fn bare(value: &str) -> Value {
+    let is_word = !value.contains(|c: char| c.is_ascii_digit());
+    match value.parse::<f64>() {
+        Ok(number) if number.is_finite() && !is_word => Value::Float(number),
+        _ => Value::String(value.to_owned()),
+    }
+}
+
 impl FromStr for Override {
     type Err = String;
 
@@ -108,7 +117,7 @@ impl FromStr for Override {
             return Err(format!("`{shown}` is not a key; write e.g. training.adam.rate=0.001"));
         }
         let value = value.trim();
-        let value = value.parse::<Value>().unwrap_or_else(|_| Value::String(value.to_owned()));
+        let value = value.parse::<Value>().unwrap_or_else(|_| bare(value));
         Ok(Self { path, value, typed: format!("--set {text}"), instead_of: None })
     }
 }
@@ -151,6 +160,17 @@ mod tests {
     #[test]
     fn a_value_that_is_not_toml_is_a_string() {
         assert_eq!(applied("data.task=limit-cycle").unwrap()["data"]["task"], Value::String("limit-cycle".into()));
+    }
+
+    #[test]
+    fn numbers_may_lack_a_digit_before_or_after_the_point() {
+        for (typed, number) in [(".1", 0.1), ("-.5", -0.5), ("2.", 2.0), (".1e-3", 1e-4), ("5.e2", 500.0)] {
+            let found = applied(&format!("training.adam.rate={typed}")).unwrap();
+            assert_eq!(found["training"]["adam"]["rate"], Value::Float(number));
+        }
+        for text in [".", ".1e999", "infinity", "1.2.3"] {
+            assert_eq!(applied(&format!("name={text}")).unwrap()["name"], Value::String(text.into()));
+        }
     }
 
     #[test]
