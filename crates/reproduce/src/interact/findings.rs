@@ -89,8 +89,7 @@ impl Regression {
 /// The thesis' ascent: momentum at alpha_init of the training (5.3.4).
 pub fn thesis(channels: usize) -> ErrorRegressionOptions {
     let ascent = Ascent::Momentum { rate: 1e-4 / channels as f64, momentum: 0.9 };
-    ErrorRegressionOptions::with(channels, |it| {
-        it.ascent = ascent;
-        it.max_norm = None;
-    })
+    let mut options = ErrorRegressionOptions::adam(channels);
+    (options.ascent, options.max_norm) = (ascent, None);
+    options
 }
