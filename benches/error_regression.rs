@@ -108,9 +108,9 @@ fn rules(subject: &Subject, window: usize) -> Vec<(&'static str, ErrorRegression
         ("Adam 0.05", rule(Ascent::Adam { rate: 0.05 }, 10)),
         ("Adam 0.01", rule(Ascent::Adam { rate: 0.01 }, 100)),
         ("momentum, the thesis' rate", rule(momentum, 100)),
-        ("L-BFGS, guarded (default)", own(10)),
-        ("L-BFGS, no guard", without_guard(10)),
-        ("L-BFGS, 15 steps, no guard", without_guard(15)),
+        ("L-BFGS, guarded (default)", own(15)),
+        ("L-BFGS, no guard", without_guard(15)),
+        ("L-BFGS, 10 steps, no guard", without_guard(10)),
     ]
 }
 

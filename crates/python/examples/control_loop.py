@@ -57,7 +57,7 @@ def learned() -> scrnn.Network:
 def main(arguments: list[str]) -> None:
     """Runs for three seconds."""
     net = scrnn.load(arguments[0]) if arguments else learned()
-    live = net.follow(window=30, iterations=10, ahead=5, deadline=DEADLINE)
+    live = net.follow(window=30, ahead=5, deadline=DEADLINE)
     robot = Robot()
     late, due = 0, time.perf_counter()
     for _ in range(150):

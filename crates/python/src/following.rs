@@ -82,14 +82,14 @@ pub struct Follower {
 #[pymethods]
 impl Follower {
     #[new]
-    #[pyo3(signature = (model, *, window=50, iterations=10, ahead=10, optimiser=None, rate=None, momentum=None, max_norm=None,
+    #[pyo3(signature = (model, *, window=50, iterations=None, ahead=10, optimiser=None, rate=None, momentum=None, max_norm=None,
         keep_best=false, tolerance=None, guard=None, deadline=None, closed_channels=vec![], masked_channels=vec![], begin=None, sequence=None, contexts=false, instruction_set=None))]
     #[expect(clippy::too_many_arguments, reason = "they come by name, from one place in the Python layer")]
     fn new(
         py: Python<'_>,
         model: &Model,
         window: usize,
-        iterations: usize,
+        iterations: Option<usize>,
         ahead: usize,
         optimiser: Option<&str>,
         rate: Option<f64>,
@@ -110,13 +110,14 @@ impl Follower {
             let only = model.only()?;
             let channels = only.checkpoint.channels.clone();
             let mut options = ErrorRegressionOptions::new(channels.len());
-            (options.window, options.iterations, options.ahead) = (window, iterations, ahead);
+            (options.window, options.ahead) = (window, ahead);
             (options.keep_best, options.tolerance, options.guard) = (keep_best, tolerance, guard);
             let named = |name: &str| {
                 let help = "give \"lbfgs\", \"adam\" or \"momentum\"";
                 Rule::named(name).ok_or_else(|| Failure::input(format!("there is no optimiser {name:?}"), help))
             };
-            let wanted = Wanted { rule: optimiser.map(named).transpose()?, rate, momentum, max_norm };
+            let rule = optimiser.map(named).transpose()?;
+            let wanted = Wanted { rule, rate, momentum, max_norm, iterations };
             wanted.change(&mut options).map_err(|Conflict { what, rule }| {
                 let message = format!("{what} does not go with optimiser={:?}", rule.name());
                 Failure::input(message, "leave one of them out")

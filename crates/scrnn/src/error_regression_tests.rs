@@ -209,7 +209,7 @@ fn small_steps_always_lead_uphill() {
     let network = network(2, true, fast_and_slow());
     for momentum in [0.0, 0.5] {
         let ascent = Ascent::Momentum { rate: 1e-4, momentum };
-        let options = ErrorRegressionOptions { ascent, ..ErrorRegressionOptions::new(3) };
+        let options = ErrorRegressionOptions { ascent, iterations: 10, ..ErrorRegressionOptions::new(3) };
         let mut regression = ErrorRegression::new(&network, &u0(&network), options, &Engine::serial()).unwrap();
         for t in 0..60 {
             let done = regression.observe(&sample(t), &mut || true).unwrap();

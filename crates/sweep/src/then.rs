@@ -153,7 +153,7 @@ pub struct Follow {
 
 impl Default for Follow {
     fn default() -> Self {
-        Self { data: None, window: 30, iterations: 10 }
+        Self { data: None, window: 30, iterations: 15 }
     }
 }
 

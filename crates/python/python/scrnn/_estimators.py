@@ -689,7 +689,7 @@ class Network:
     def follow(
         self,
         window: int = 50,
-        iterations: int = 10,
+        iterations: int | None = None,
         ahead: int = 10,
         *,
         optimiser: str | None = None,
@@ -710,7 +710,7 @@ class Network:
 
         Args:
             window: Steps in the sliding window, 1 to 1000000.
-            iterations: Updates of the internal state for each sample.
+            iterations: Updates of the internal state for each sample; by default 15 with ``"lbfgs"`` and 10 with the others.
             ahead: Samples to predict beyond the next one.
             optimiser: ``"lbfgs"`` (default), ``"adam"`` (default with ``rate`` or ``max_norm``) or ``"momentum"``, the thesis' (default with
                 ``momentum``).
@@ -736,7 +736,8 @@ class Network:
         1
         """
         whole("window", window, 1, 1_000_000)
-        whole("iterations", iterations, 0, 1_000_000)
+        if iterations is not None:
+            whole("iterations", iterations, 0, 1_000_000)
         whole("ahead", ahead, 0, 100_000)
         if begin not in (None, "mean", "likely"):
             raise _scrnn.Error(f"there is no way to begin {begin!r}\ngive \"mean\", or leave it away")

@@ -164,7 +164,7 @@ class Follower:
         model: Model,
         *,
         window: int = ...,
-        iterations: int = ...,
+        iterations: int | None = ...,
         ahead: int = ...,
         optimiser: str | None = ...,
         rate: float | None = ...,

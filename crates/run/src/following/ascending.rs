@@ -47,6 +47,8 @@ pub struct Wanted {
     pub momentum: Option<f64>,
     /// Longest gradient; 0 leaves it as it is.
     pub max_norm: Option<f64>,
+    /// Steps for each sample; by default as many as suit the rule.
+    pub iterations: Option<usize>,
 }
 
 /// Two things that do not go together.
@@ -64,7 +66,7 @@ impl Wanted {
     /// # Errors
     /// A [`Conflict`].
     pub fn change(self, options: &mut ErrorRegressionOptions) -> Result<(), Conflict> {
-        let Self { rule, rate, momentum, max_norm } = self;
+        let Self { rule, rate, momentum, max_norm, iterations } = self;
         let has_rate = rate.is_some() || max_norm.is_some();
         let rule = match rule {
             None if momentum.is_some() => Some(Rule::Momentum),
@@ -84,6 +86,14 @@ impl Wanted {
             Some(Rule::Lbfgs) => options.ascent = ErrorRegressionOptions::new(0).ascent,
             None => {}
         }
+        match (iterations, rule) {
+            (Some(given), _) => options.iterations = given,
+            (None, Some(Rule::Lbfgs)) => options.iterations = ErrorRegressionOptions::new(0).iterations,
+            (None, Some(Rule::Adam | Rule::Momentum)) => {
+                options.iterations = ErrorRegressionOptions::adam(0).iterations
+            }
+            (None, None) => {}
+        }
         if let Some(rate) = rate {
             options.ascent = options.ascent.with_rate(rate);
         }
@@ -101,6 +111,25 @@ mod tests {
     fn chosen(wanted: Wanted) -> Result<Ascent, Conflict> {
         let mut options = ErrorRegressionOptions::new(4);
         wanted.change(&mut options).map(|()| options.ascent)
+    }
+
+    #[test]
+    fn each_rule_has_its_own_number_of_steps_unless_one_is_given() {
+        let all = Wanted::default();
+        let rule = |rule| Wanted { rule: Some(rule), ..all };
+        for default in [ErrorRegressionOptions::new(4), ErrorRegressionOptions::adam(4)] {
+            let steps = |wanted: Wanted| {
+                let mut options = default.clone();
+                wanted.change(&mut options).unwrap();
+                options.iterations
+            };
+            assert_eq!(steps(all), default.iterations);
+            assert_eq!([Rule::Lbfgs, Rule::Adam, Rule::Momentum].map(|one| steps(rule(one))), [15, 10, 10]);
+            assert_eq!(steps(Wanted { rate: Some(0.1), ..all }), 10);
+            assert_eq!(steps(Wanted { momentum: Some(0.5), ..all }), 10);
+            assert_eq!(steps(Wanted { iterations: Some(3), ..rule(Rule::Lbfgs) }), 3);
+            assert_eq!(steps(Wanted { iterations: Some(0), ..all }), 0);
+        }
     }
 
     #[test]
@@ -123,6 +152,7 @@ mod tests {
         let mut options = ErrorRegressionOptions::adam(4);
         Wanted { rate: Some(0.02), ..all }.change(&mut options).unwrap();
         assert_eq!(options.ascent, Ascent::Adam { rate: 0.02 });
+        assert_eq!(options.iterations, 10);
         assert_eq!(
             ["lbfgs", "adam", "momentum"].map(|name| Rule::named(name).unwrap().name()),
             ["lbfgs", "adam", "momentum"]

@@ -15,7 +15,7 @@ pub struct RegressionArguments {
     /// Steps in the sliding window, 1 to 1000000 [default: 50]
     #[arg(long, value_name = "W", value_parser = crate::args::count(1, 1_000_000))]
     window: Option<usize>,
-    /// Updates of the internal state for each sample, 0 to 1000000 [default: 10]
+    /// Updates of the internal state for each sample, 0 to 1000000 [default: 15 with lbfgs, 10 with the others]
     #[arg(long, value_name = "N", value_parser = crate::args::count(0, 1_000_000))]
     steps: Option<usize>,
     /// How the internal state is moved [default: lbfgs; adam to simulate, and with --rate or --max-norm; momentum with --momentum]
@@ -74,13 +74,12 @@ impl RegressionArguments {
     pub fn options(&self, default: ErrorRegressionOptions, rate: Option<f64>) -> Result<ErrorRegressionOptions> {
         let mut options = default;
         options.window = self.window.unwrap_or(options.window);
-        options.iterations = self.steps.unwrap_or(options.iterations);
         let rule = self.optimiser.map(|optimiser| match optimiser {
             Optimiser::Momentum => Rule::Momentum,
             Optimiser::Adam => Rule::Adam,
             Optimiser::Lbfgs => Rule::Lbfgs,
         });
-        let wanted = Wanted { rule, rate, momentum: self.momentum, max_norm: self.max_norm };
+        let wanted = Wanted { rule, rate, momentum: self.momentum, max_norm: self.max_norm, iterations: self.steps };
         wanted.change(&mut options).map_err(|Conflict { what, rule }| {
             let message = format!("--{} does not go with --optimiser {}", what.replace('_', "-"), rule.name());
             Failure::input(message, "leave one of them out")
