@@ -23,10 +23,11 @@ use arguments::Arguments;
 use cache::read_gbytes;
 use machine::{median, peak_gflops, seconds_per_call};
 use scrnn::dataset::Dataset;
-use scrnn::engine::InstructionSet;
+use scrnn::engine::{Engine, InstructionSet};
 use scrnn::initialization::initialize;
 use scrnn::kernels::padded;
 use scrnn::learning::{EpochReport, Learner};
+use scrnn::objective::Precision;
 use scrnn::topology::Topology;
 use scrnn_tasks::lissajous;
 use serde_json::{Value, json};
@@ -40,8 +41,6 @@ const CHANNELS: usize = 2;
 const OUTPUTS: usize = 2 * CHANNELS;
 /// What one measurement takes at least.
 const BURST: Duration = Duration::from_millis(30);
-/// What two threads work before they are measured.
-const SETTLING: Duration = Duration::from_millis(100);
 
 /// Sizes of an S-CTRNN and its data.
 #[derive(Debug, Clone, Copy)]
@@ -128,9 +127,17 @@ fn main() {
     }
 }
 
+/// All on a thread of the two: were it another one that takes turns with both, the system would for a while leave both on one core.
 fn measure(shape: Shape, data: &Dataset, rounds: usize, set: InstructionSet) -> Measured {
-    let sequences = shape.sequences;
-    let mut trainings = [1, 2].map(|threads| Training::new(&shape.topology(), data, threads, set));
+    let engines = [1, 2].map(|threads| Engine::new(threads, set).expect("an instruction set that this processor has"));
+    engines[1].enter(|| measure_on(shape, data, rounds, &engines))
+}
+
+fn measure_on(shape: Shape, data: &Dataset, rounds: usize, engines: &[Engine; 2]) -> Measured {
+    let (sequences, set) = (shape.sequences, engines[0].instruction_set());
+    let topology = shape.topology();
+    let mut trainings =
+        engines.each_ref().map(|engine| Training::on(&topology, data, engine.clone(), Precision::default()));
     let (network, states) = initialize(&shape.topology(), sequences, 1);
     let mut plain = plain_nalgebra::Epoch::new(&network, &states, data);
     agree(&mut trainings[0].learner, &plain.run());
@@ -138,15 +145,12 @@ fn measure(shape: Shape, data: &Dataset, rounds: usize, set: InstructionSet) -> 
     let [mut seconds, mut shares] = [const { [const { Vec::new() }; 2] }; 2];
     let (mut fastest, mut highest) = (f64::INFINITY, 0.0_f64);
     let (mut nalgebra, mut reach) = (Vec::new(), Vec::new());
-    let of = |span: Duration, one: Duration| span.as_micros().div_ceil(one.as_micros().max(1)) as u64;
-    let alone = trainings.each_mut().map(|training| training.time(1));
-    let epochs = alone.map(|one| of(BURST, one));
+    let epochs = trainings.each_mut().map(|training| {
+        let one = training.time(1).max(Duration::from_micros(1));
+        BURST.as_micros().div_ceil(one.as_micros()) as u64
+    });
     for _ in 0..rounds {
         for (index, training) in trainings.iter_mut().enumerate() {
-            if index == 1 {
-                // A system may leave two threads on one core for a while, as no training would notice.
-                training.time(of(SETTLING, alone[1]));
-            }
             let peak = peak_gflops(set, index + 1);
             let time = training.time(epochs[index]).as_secs_f64() / epochs[index] as f64;
             seconds[index].push(time);

@@ -45,13 +45,18 @@ impl Training {
         set: InstructionSet,
         precision: Precision,
     ) -> Self {
+        let engine = Engine::new(threads, set).expect("an instruction set that this processor has");
+        Self::on(topology, data, engine, precision)
+    }
+
+    /// The same on an engine.
+    pub fn on(topology: &Topology, data: &Dataset, engine: Engine, precision: Precision) -> Self {
         let (network, states) = initialize(topology, data.sequences().len(), 1);
         let plan = Plan::with(|it| {
             it.epochs = 1 << 50;
             it.precision = precision;
             it.optimiser = Optimiser::Adam(Adam::default());
         });
-        let engine = Engine::new(threads, set).expect("an instruction set that this processor has");
         let learner = Learner::new(network, states, data, plan, &engine).expect("data made for the network");
         Self { learner, engine }
     }
