@@ -43,7 +43,10 @@ impl Trained {
                 let message = format!("{} holds a mixture of {members} networks", path.display());
                 return Err(Failure::input(
                     message,
-                    format!("give one of them: {}", run_folder::member(path, 1).display()),
+                    format!(
+                        "give one of them: {}; a network that is to work alone is better trained without members",
+                        run_folder::member(path, 1).display()
+                    ),
                 ));
             }
             if !file.exists() {
