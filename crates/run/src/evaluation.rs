@@ -283,8 +283,7 @@ impl Bench {
                     it.polish = 100;
                     it.initial_state_variance = search.initial_state_variance;
                 });
-                let search = || recognize(member.network, member.states, &data, &options, &self.engine);
-                let mut found = self.engine.enter(search)?;
+                let mut found = recognize(member.network, member.states, &data, &options, &self.engine)?;
                 Ok(found.swap_remove(0).trials.swap_remove(0).initial_state)
             });
             states.collect::<Result<Vec<_>>>()

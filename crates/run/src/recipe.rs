@@ -154,7 +154,7 @@ fn smooth(
         }
         false => {
             "A minute or two of one core. `members = 4` mixes four networks, each of which learns twice as long: its closed loops \
-             come nearer, and know better how far they can be trusted."
+             come nearer, and are likelier."
         }
     });
     reasons.add("training.optimiser", "Learns sooner than the thesis' rule.");

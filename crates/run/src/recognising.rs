@@ -158,7 +158,7 @@ pub fn recognising<'a>(
     let (mut recognitions, mut generated) = (Vec::new(), Vec::new());
     for one in all {
         let states = &one.checkpoint.initial_states;
-        let found = engine.enter(|| recognize(&one.network(), states, &scaled, &options.of(one), engine))?;
+        let found = recognize(&one.network(), states, &scaled, &options.of(one), engine)?;
         generated.push(replay(one, &scaled, &found, heard, engine)?);
         recognitions.push(found);
     }

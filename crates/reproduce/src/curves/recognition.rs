@@ -46,8 +46,7 @@ pub fn recognition<'a>(
         it.epochs = RecognitionOptions::default().epochs.min(learned.experiment.training.epochs);
     });
     let (n, delay) = (new.channels().len(), learned.network.topology().delay());
-    let search = || recognize(&learned.network, &learned.initial_states, new, &options, engine);
-    let found = engine.enter(search)?;
+    let found = recognize(&learned.network, &learned.initial_states, new, &options, engine)?;
     desk.at(|| "recognition: running from what was found".to_owned())?;
     let starts: Vec<Start<'_>> = found
         .iter()

@@ -100,8 +100,7 @@ impl Study for LimitCycle {
         });
         let found: Vec<Vec<f64>> = desk.part("recognition", || {
             desk.say("recognition of new sequences");
-            let search = || recognize(network, &learned.initial_states, &new.task.data, &options, engine);
-            let found = engine.enter(search)?;
+            let found = recognize(network, &learned.initial_states, &new.task.data, &options, engine)?;
             Ok(found.into_iter().map(|mut found| found.trials.swap_remove(0).initial_state).collect())
         })?;
         let found: Vec<&[f64]> = found.iter().map(Vec::as_slice).collect();

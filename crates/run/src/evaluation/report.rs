@@ -199,8 +199,7 @@ fn recognition(bench: &Bench, members: &[Member<'_>], learned: &[String]) -> Res
             (it.starts, it.epochs, it.polish, it.ranked) = (1, 0, 0, learned.len());
             it.warm_starts = vec![WarmStart::Mean];
         });
-        let search = || recognize(member.network, member.states, &bench.data, &options, &bench.engine);
-        let found = bench.engine.enter(search)?;
+        let found = recognize(member.network, member.states, &bench.data, &options, &bench.engine)?;
         for (s, found) in found.iter().enumerate() {
             for ranked in &found.ranking {
                 scores[s][ranked.sequence].push(ranked.ln_likelihood);

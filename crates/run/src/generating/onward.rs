@@ -57,8 +57,7 @@ pub fn onward(all: &[Trained], data: &Dataset, options: Onward, engine: &Engine)
                 it.seed = options.seed;
                 it.initial_state_variance = one.initial_state_variance();
             });
-            let states = &one.checkpoint.initial_states;
-            recognised.extend(engine.enter(|| recognize(network, states, &beginning, &search, engine))?);
+            recognised.extend(recognize(network, &one.checkpoint.initial_states, &beginning, &search, engine)?);
         }
         let recognised: Vec<_> = recognised.iter().collect();
         let part = (sequence.values(), heard, ahead);
